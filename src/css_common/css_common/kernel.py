@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The one decorator that compiles Sunpoint's algorithms, and the place of the compile cache.
+
+Numba checks only the file of the function it loads from its cache: a cached caller keeps an old copy of a
+function that lives in another file. The cache folder is therefore named by a hash of every source file that
+can hold a kernel, and of the versions that compile them: edit one, and all are compiled anew.
+"""
+
+import hashlib
+import importlib.util
+import os
+import sys
+from pathlib import Path
+
+import llvmlite
+import numba
+
+KERNEL_PACKAGES = (
+    "css_common",
+    "css_environment",
+    "css_sim",
+    "css_estimation",
+    "sunpoint_control",
+    "css_studies",
+)
+# Folders that call kernels but define none: an edit there must not cost a compilation.
+_NOT_KERNELS = {"nodes", "commands", "data", "test"}
+
+
+def kernel_source_hash() -> str:
+    """Hash of all sources that can hold kernels and of the compiler that reads them."""
+    digest = hashlib.sha256(
+        f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__}".encode()
+    )
+    for package in KERNEL_PACKAGES:
+        spec = importlib.util.find_spec(package)
+        if spec is None or not spec.submodule_search_locations:
+            continue
+        root = Path(spec.submodule_search_locations[0])
+        for source in sorted(root.rglob("*.py")):
+            relative = source.relative_to(root)
+            if _NOT_KERNELS.isdisjoint(relative.parts):
+                digest.update(f"{package}/{relative}".encode())
+                digest.update(source.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def cache_folder() -> Path:
+    """Folder of the compiled kernels: inside the project when started by `./sunpoint`, else the user's cache."""
+    home = os.environ.get("SUNPOINT_HOME")
+    if home:
+        base = Path(home) / ".cache"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "sunpoint"
+    return base / "kernels" / kernel_source_hash()
+
+
+if "NUMBA_CACHE_DIR" not in os.environ:
+    numba.config.CACHE_DIR = str(cache_folder())
+
+kernel = numba.njit(cache=True, error_model="numpy", fastmath=False)
+"""Compiles a pure function on scalars, tuples and small arrays; `kernel_function.py_func` is the plain Python."""
