@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Instants as integer nanoseconds of UTC since 1970, the clock of every ROS stamp."""
+
+from datetime import UTC, datetime, timedelta
+
+_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+def parse_utc(text: str) -> int:
+    """Nanoseconds since 1970 of an ISO 8601 instant; without an offset it is UTC.
+
+    Raises:
+        ValueError: the text is not an ISO 8601 date and time.
+    """
+    try:
+        instant = datetime.fromisoformat(text)
+    except ValueError as error:
+        raise ValueError(f"{text!r} is not a UTC instant such as 2013-06-01T00:00:00Z") from error
+    if instant.tzinfo is None:
+        instant = instant.replace(tzinfo=UTC)
+    return (instant - _EPOCH) // timedelta(microseconds=1) * 1000
+
+
+def format_utc(stamp_ns: int) -> str:
+    """ISO 8601 text, to the microsecond, of nanoseconds since 1970."""
+    return (_EPOCH + timedelta(microseconds=stamp_ns // 1000)).isoformat().replace("+00:00", "Z")
+
+
+def stamp_of_step(epoch_ns: int, step: int, period_ns: int) -> int:
+    """Stamp of step k; integer arithmetic, so that stamps of all nodes agree to the nanosecond."""
+    return epoch_ns + step * period_ns
