@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Mission sections that several nodes share, with the checks that one value alone cannot pass or fail.
+
+They stand under `/**` in a mission file. Defaults are the spacecraft and orbit of O'Keefe & Schaub 2013.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from css_common.epochs import parse_utc
+from css_common.schema import Table, Values, choice, flag, integer, real, reals, text, texts
+
+_R = 0.7071067811865476
+
+MISSION: Table = (
+    text("mission.name", "okeefe_2013", "name of the mission, as in the file name"),
+    text("mission.description", "", "one line for reports"),
+    text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step"),
+    real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7),
+    real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0),
+    integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1),
+    integer("mission.case", 0, "-", "case number within the seed", low=0, high=2**32 - 1),
+)
+
+ORBIT: Table = (
+    choice("orbit.source", "elements", ("elements", "tle"), "what defines the orbit"),
+    real("orbit.altitude", 400e3, "m", "semi-major axis above the equatorial radius", low=100e3, high=1e9),
+    real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9),
+    real("orbit.inclination_deg", 45.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
+    real("orbit.raan_deg", 60.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
+    real("orbit.argument_of_perigee_deg", 0.0, "deg", "argument of perigee", low=-360.0, high=360.0),
+    real("orbit.true_anomaly_deg", 0.0, "deg", "true anomaly at the epoch", low=-360.0, high=360.0),
+    flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
+    text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
+    text("orbit.tle_line2", "", "second line of the element set"),
+)
+
+SPACECRAFT: Table = (
+    reals(
+        "spacecraft.inertia",
+        (10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75),
+        "kg m^2",
+        "inertia matrix about the centre of mass, wheels included, row-major",
+        length=9,
+        columns=3,
+    ),
+    reals("spacecraft.array_normal", (0.0, 0.0, 1.0), "-", "normal of the solar arrays in b", length=3),
+)
+
+CELLS: Table = (
+    reals(
+        "cells.normals",
+        tuple(v for z in (_R, -_R) for xy in ((_R, 0.0), (0.0, _R), (-_R, 0.0), (0.0, -_R)) for v in (*xy, z)),
+        "-",
+        "outward normals of the coarse sun sensor cells in b, at most 32 rows of x, y, z",
+        columns=3,
+    ),
+    real("cells.field_of_view_deg", 120.0, "deg", "full cone of view of a cell", low=1.0, high=180.0),
+    reals(
+        "cells.clip_normal",
+        (0.0, 0.0, 1.0),
+        "-",
+        "normal of the body plane that hides the other half space from each cell; zeros: no such plane",
+        length=3,
+    ),
+)
+
+WHEELS: Table = (
+    reals(
+        "wheels.axes",
+        (0.0, _R, _R, 0.0, _R, -_R, _R, -_R, 0.0, -_R, -_R, 0.0),
+        "-",
+        "spin axes of the reaction wheels in b, one row of x, y, z each",
+        columns=3,
+    ),
+    real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True),
+    real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0),
+    real("wheels.max_speed_rpm", 6000.0, "rpm", "speed limit of each wheel", low=0.0),
+)
+
+RODS: Table = (
+    flag("rods.fitted", False, "the spacecraft carries magnetic torque rods"),
+    reals("rods.axes", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), "-", "rod axes in b, a row each", columns=3),
+    real("rods.max_dipole", 20.0, "A m^2", "dipole limit of each rod", low=0.0),
+)
+
+MAGNETOMETER: Table = (
+    integer("magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000),
+)
+
+GRAPH: Table = (
+    texts(
+        "graph.nodes",
+        (
+            "css_sim/dynamics",
+            "css_sim/css_array",
+            "css_sim/gyro",
+            "css_estimation/ekf",
+            "sunpoint_control/mrp_control",
+        ),
+        "nodes of the graph as PACKAGE/EXECUTABLE, or PACKAGE/EXECUTABLE:NAME for a second one of a kind",
+    ),
+    text("graph.estimator", "ekf", "name of the Sun estimator that the control listens to"),
+)
+
+LOCKSTEP: Table = (
+    texts("lockstep.wait_for", (), "topics that dynamics waits for; empty: commands and all estimates"),
+    real("lockstep.realtime_factor", 0.0, "-", "pace against the wall clock; 0: as fast as it goes", low=0.0),
+    real("lockstep.warn_after", 2.0, "s", "wall time of silence before the missing topic is named", low=0.05),
+    real(
+        "lockstep.hold_limit",
+        30.0,
+        "s",
+        "wall time of silence before the flight goes on without the partner, actuators at rest",
+        low=0.1,
+    ),
+    real("lockstep.startup_limit", 60.0, "s", "wall time allowed for all partners to appear", low=0.1),
+)
+
+IO: Table = (
+    choice(
+        "io.input_matching",
+        "exact",
+        ("exact", "latest"),
+        "exact: inputs of one stamp belong together; latest: the newest of each, for devices with own clocks",
+    ),
+    real("io.deadline", 0.5, "s", "age at which an input counts as silent", low=0.001, tunable=True),
+    text("io.body_frame", "bus", "frame_id of body-frame messages"),
+    text("io.inertial_frame", "eci", "frame_id of inertial messages"),
+    flag("autostart", True, "configure and activate without being asked"),
+)
+
+SECTIONS: dict[str, Table] = {
+    "mission": MISSION,
+    "orbit": ORBIT,
+    "spacecraft": SPACECRAFT,
+    "cells": CELLS,
+    "wheels": WHEELS,
+    "rods": RODS,
+    "magnetometer": MAGNETOMETER,
+    "graph": GRAPH,
+    "lockstep": LOCKSTEP,
+    "io": IO,
+}
+
+
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values of the shared sections, one message each: key, value, what was expected."""
+    if hasattr(values, "mission"):
+        try:
+            parse_utc(values.mission.epoch)
+        except ValueError as error:
+            yield f"mission.epoch: {error}"
+    if hasattr(values, "orbit") and values.orbit.source == "tle":
+        for key in ("tle_line1", "tle_line2"):
+            if len(getattr(values.orbit, key)) != 69:
+                yield f"orbit.{key}: expected the 69 characters of a two-line element set"
+    if hasattr(values, "spacecraft"):
+        yield from _spacecraft_conflicts(values.spacecraft)
+    if hasattr(values, "cells"):
+        yield from _unit_rows("cells.normals", values.cells.normals, 1, 32)
+        clip = np.linalg.norm(values.cells.clip_normal)
+        if clip != 0.0 and abs(clip - 1.0) > 1e-6:
+            yield f"cells.clip_normal: length {clip:.6g} given, expected a unit vector or zeros"
+    if hasattr(values, "wheels"):
+        yield from _unit_rows("wheels.axes", values.wheels.axes, 3, 32)
+        rank = np.linalg.matrix_rank(values.wheels.axes) if values.wheels.axes.size else 0
+        if rank < 3:
+            yield f"wheels.axes: they span {rank} of 3 directions, expected axes that span all"
+    if hasattr(values, "rods"):
+        yield from _unit_rows("rods.axes", values.rods.axes, 1, 32)
+
+
+def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:
+    inertia = spacecraft.inertia
+    if not np.allclose(inertia, inertia.T, rtol=1e-12, atol=0.0):
+        yield "spacecraft.inertia: not symmetric, expected a symmetric positive definite matrix"
+        return
+    moments = np.linalg.eigvalsh(inertia)
+    if moments[0] <= 0.0:
+        yield f"spacecraft.inertia: eigenvalue {moments[0]:.6g} given, expected a positive definite matrix"
+    elif moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
+        yield (
+            f"spacecraft.inertia: principal moments {moments.round(6).tolist()} break the triangle inequality, "
+            "no rigid body has them"
+        )
+    length = np.linalg.norm(spacecraft.array_normal)
+    if abs(length - 1.0) > 1e-6:
+        yield f"spacecraft.array_normal: length {length:.6g} given, expected a unit vector"
+
+
+def _unit_rows(name: str, rows: np.ndarray, least: int, most: int) -> Iterator[str]:
+    if not least <= len(rows) <= most:
+        yield f"{name}: {len(rows)} rows given, expected {least} to {most}"
+    for i, length in enumerate(np.linalg.norm(rows, axis=1)):
+        if abs(length - 1.0) > 1e-6:
+            yield f"{name}: row {i} has length {length:.6g}, expected unit vectors"
