@@ -114,12 +114,3 @@ def matmul(a: Mat3, b: Mat3) -> Mat3:
 def mat3(m) -> Mat3:
     """A (3, 3) array as a tuple of rows."""
     return (row(m, 0), row(m, 1), row(m, 2))
-
-
-@kernel
-def all_finite(values) -> bool:
-    """True when no element of an array is NaN or infinite."""
-    for value in values:  # noqa: SIM110  (a generator expression does not compile)
-        if not math.isfinite(value):
-            return False
-    return True

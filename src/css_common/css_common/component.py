@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a node author writes: a component. No rclpy here; `css_common.host` puts it into a lifecycle node.
+
+A component says which parameters it has, which messages it takes and gives, and what one cycle does. The host owns
+the rest: lifecycle, parameter declaration, stamp matching, message checks, diagnostics, shutdown. Replay steps the
+same component without a node, which is why a replayed estimator gives the bytes that flew.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from css_common.codec import Sample
+from css_common.epochs import parse_utc
+from css_common.schema import Parameter, Table, Values
+from css_common.sections import SECTIONS
+
+BODY = "body"
+INERTIAL = "inertial"
+
+
+@dataclass(frozen=True)
+class Input:
+    """A topic that a component listens to.
+
+    Attributes:
+        key: the component's own name for it.
+        topic: relative topic name.
+        message_type: ROS message class.
+        required: without it there is no cycle; an optional input may be silent in real time (a dead gyro).
+        divider: a message is due every `divider` steps.
+        lengths: expected length of array fields; another length is refused at the edge.
+        frame: whose frame_id is expected, `BODY` or `INERTIAL`.
+    """
+
+    key: str
+    topic: str
+    message_type: type
+    required: bool = True
+    divider: int = 1
+    lengths: Mapping[str, int] = field(default_factory=dict)
+    frame: str = BODY
+
+
+@dataclass(frozen=True)
+class Output:
+    """A topic that a component publishes.
+
+    Attributes:
+        key: the component's own name for it.
+        topic: relative topic name.
+        message_type: ROS message class.
+        frame: whose frame_id it carries, `BODY` or `INERTIAL`.
+        divider: published every `divider` steps.
+        ends_cycle: in lockstep the plant waits for it before it advances (estimates and commands).
+    """
+
+    key: str
+    topic: str
+    message_type: type
+    frame: str = BODY
+    divider: int = 1
+    ends_cycle: bool = False
+
+
+Received = Mapping[str, Sample | None]
+Outgoing = Mapping[str, Sample]
+
+
+class Component:
+    """One part of the flight graph, cycled once per step.
+
+    Class attributes:
+        shared: mission sections whose values the component reads (`sections.SECTIONS`), besides mission and io.
+        parameters: its own parameters.
+    """
+
+    shared: ClassVar[tuple[str, ...]] = ()
+    parameters: ClassVar[Table] = ()
+
+    def __init__(self, name: str, values: Values) -> None:
+        self.name = name
+        self.values = values
+        self.period_ns = round(values.mission.period * 1e9)
+        self.epoch_ns = parse_utc(values.mission.epoch)
+        self.frames = {
+            output.key: values.io.body_frame if output.frame == BODY else values.io.inertial_frame
+            for output in self.outputs(name, values)
+        }
+        self.configure()
+
+    @classmethod
+    def table(cls) -> Table:
+        """All parameters of the node: shared sections first, then its own."""
+        sections = dict.fromkeys(("mission", "io", *cls.shared))
+        return tuple(p for section in sections for p in SECTIONS[section]) + tuple(cls.parameters)
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        """Topics it listens to; the first is the one that paces it when inputs have clocks of their own."""
+        return ()
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        """Topics it publishes."""
+        return ()
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        """What is wrong between parameters, one message each."""
+        return ()
+
+    def configure(self) -> None:
+        """Builds algorithm parameters and the initial state from `self.values`."""
+
+    def tune(self, values: Values) -> None:
+        """Takes new values of tunable parameters in flight; the state stays."""
+        self.values = values
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        """One step: the inputs of one stamp (None for what is silent or not due) to the outputs of that stamp."""
+        raise NotImplementedError
+
+    def idle(self, stamp_ns: int, received: Received) -> Outgoing:
+        """What it still publishes while deactivated; nothing unless overridden."""
+        return {}
+
+    def step_of(self, stamp_ns: int) -> int:
+        """Number of the control cycle at a stamp, counted from the mission epoch."""
+        return round((stamp_ns - self.epoch_ns) / self.period_ns)
+
+    def message(self, key: str, stamp_ns: int, **fields: Any) -> Sample:
+        """A message for output `key`; every field of its type must be given."""
+        return Sample(stamp_ns, self.frames[key], **fields)
+
+
+class Plant(Component):
+    """The component that owns simulated time: it publishes the first stamp and advances when all have answered."""
+
+    finished: bool = False
+
+    def begin(self) -> Outgoing:
+        """Messages of step 0."""
+        raise NotImplementedError
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        """Inputs stamped k (None: the partner is lost) to the messages stamped k + 1; sets `finished` at the end."""
+        raise NotImplementedError
+
+
+def own_parameter(component: type[Component], name: str) -> Parameter:
+    """Specification of one parameter of a component.
+
+    Raises:
+        KeyError: it has no such parameter.
+    """
+    for parameter in component.table():
+        if parameter.name == name:
+            return parameter
+    raise KeyError(name)
