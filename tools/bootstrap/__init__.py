@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `./sunpoint` does before a verb runs: install, build, compose the environment. Standard library only."""

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Builds the packages of the workspace with colcon and records the environment they need."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+from bootstrap import fingerprint
+from bootstrap.environment import SYSTEM, changes, compose, toolchain
+from bootstrap.plan import Need
+from bootstrap.progress import CommandFailed, Step, run
+from bootstrap.project import Environment, Refusal
+from bootstrap.work import Work
+
+# colcon run by the environment's Python: the executables it installs start with the Python that runs it,
+# which for a colcon script of the system is the system's.
+COLCON = "import sys; from colcon_core.command import main; sys.exit(main())"
+OPTIONS = (
+    *("--base-paths", "src", "--symlink-install"),
+    *("--event-handlers", "console_direct+", "desktop_notification-", "terminal_title-", "status-"),
+    *("--cmake-args", "-DCMAKE_BUILD_TYPE=Release", "-DBUILD_TESTING=OFF", "-GNinja"),
+)
+
+
+def build(work: Work, need: Need) -> None:
+    """Build what changed, forget what is gone. Raises Refusal with the end of colcon's output."""
+    state = work.state
+    for name in need.removed:
+        _discard(work, name)
+        del state.packages[name]
+    for name in need.packages:
+        if state.packages.pop(name, None) is None:
+            # Never built, or its build was interrupted: begin from nothing.
+            _discard(work, name)
+        else:
+            # Executables whose source is gone would stay.
+            shutil.rmtree(work.project.executable(name, "any").parent, ignore_errors=True)
+            _result_file(work, name).unlink(missing_ok=True)
+    # Forgotten before it is touched, so that an interrupted build counts as none.
+    work.save()
+    if need.packages:
+        _colcon(work, need)
+    install_ros2(work)
+    state.environment = _environment(work)
+    work.save()
+
+
+def _colcon(work: Work, need: Need) -> None:
+    names = sorted(need.packages)
+    log = work.log("build.log")
+    label = "building the ROS packages" if not work.state.packages else f"building {', '.join(names)}"
+    python = work.project.python
+    command = [python, "-c", COLCON, "--log-base", "log/colcon", "build", *_selection(work, names), *OPTIONS]
+    failure = None
+    with Step(label) as step:
+        try:
+            run(step, command, work.env, work.project.root, log)
+        except CommandFailed as error:
+            failure = work.explained(error, label)
+        finally:
+            built = [name for name in names if _succeeded(work, name)]
+            work.state.packages.update({name: need.packages[name] for name in built})
+            work.save()
+        if failure:
+            raise failure
+    if len(built) < len(names):
+        missing = ", ".join(sorted(set(names) - set(built)))
+        raise Refusal(f"colcon did not build {missing}", f"the whole output is in {log.relative_to(work.project.root)}")
+
+
+def _selection(work: Work, names: list[str]) -> list[str]:
+    """colcon's options that limit a build to what changed; messages take along what is made from them."""
+    if not work.state.packages:
+        return []
+    above = any(fingerprint.has_interfaces(work.project.source / name) for name in names)
+    return ["--packages-above" if above else "--packages-select", *names]
+
+
+def _result_file(work: Work, name: str) -> Path:
+    """Where colcon leaves the exit code of a package's build."""
+    return work.project.build / name / "colcon_build.rc"
+
+
+def _succeeded(work: Work, name: str) -> bool:
+    file = _result_file(work, name)
+    return file.is_file() and file.read_text().strip() == "0"
+
+
+def _discard(work: Work, name: str) -> None:
+    for folder in (work.project.build, work.project.install):
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
+def _environment(work: Work) -> Environment:
+    """What sourcing `install/local_setup.sh` adds to the environment of the tools."""
+    tools = toolchain(work.project, work.ros)
+    before = compose(work.base, tools)
+    show = 'exec "$0" -I -S -c "import json, os; print(json.dumps(dict(os.environ)))"'
+    script = f". {work.project.install}/local_setup.sh >&2 && {show}"
+    if not (work.project.install / "local_setup.sh").is_file():
+        return tools
+    shown = subprocess.check_output(["sh", "-c", script, work.project.python], env=before)
+    added = changes(before, json.loads(shown))
+    prepend = {name: [*added.prepend.get(name, []), *tools.prepend.get(name, [])] for name in {**added.prepend, **tools.prepend}}
+    return Environment(assign={**tools.assign, **added.assign}, prepend=prepend)
+
+
+def install_ros2(work: Work) -> None:
+    """Put a small `ros2` command into the environment when no real one is there."""
+    if work.ros == SYSTEM and shutil.which("ros2", path=work.base.get("PATH")):
+        return
+    source = work.project.root / "tools" / "ros2.py"
+    target = work.project.venv / "bin" / "ros2"
+    target.write_text(f"#!{work.project.python}\n{source.read_text()}")
+    target.chmod(0o755)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Turns a command line into the verb's own process, after making sure that everything is in place."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from pathlib import Path
+
+from bootstrap.environment import compose, ros_source, without_other_sunpoint
+from bootstrap.plan import find_need
+from bootstrap.project import Project, Refusal, State
+from bootstrap.verbs import VERBS, help_text, unknown_verb
+
+
+def main(arguments: list[str]) -> int:
+    """Run one command line; returns only when no executable has taken over."""
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(help_text())
+        return 0
+    verb, *rest = arguments
+    if verb not in VERBS:
+        print(unknown_verb(verb), file=sys.stderr)
+        return 2
+    project = Project(Path(__file__).resolve().parents[2])
+    try:
+        return _start(project, verb, rest)
+    except Refusal as refusal:
+        print(f"sunpoint: {refusal}", file=sys.stderr)
+        if refusal.remedy:
+            print(f"  {refusal.remedy}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("sunpoint: interrupted; the next start continues", file=sys.stderr)
+        return 130
+
+
+def _start(project: Project, verb: str, arguments: list[str]) -> int:
+    base = without_other_sunpoint(os.environ)
+    ros = ros_source(base)
+    state = State.load(project.state_file)
+    if find_need(project, ros, state, with_tests=verb == "test"):
+        state = _prepare(project, ros, base, with_tests=verb == "test")
+    env = compose(base, state.environment)
+    if verb == "test":
+        from bootstrap.checks import run_checks
+
+        return run_checks(project, arguments, env)
+    if verb == "shell":
+        return _replace_process(_shell(project, arguments), {"ROS_PYTHON_CHECK_FIELDS": "1", **env})
+    package, executable = VERBS[verb].package, VERBS[verb].executable
+    file = project.executable(package, executable)
+    if not file.is_file():
+        raise Refusal(f"package {package} has no executable {executable}")
+    return _replace_process([str(file), *arguments], env)
+
+
+def _prepare(project: Project, ros: str, base: dict[str, str], with_tests: bool) -> State:
+    from bootstrap.progress import Terminated
+    from bootstrap.workspace import prepare  # late: a start with nothing to do stays fast
+
+    try:
+        return prepare(project, ros, base, with_tests)
+    except Terminated as stop:
+        sys.exit(stop.exit_code)
+
+
+def _shell(project: Project, arguments: list[str]) -> list[str]:
+    """bash with the given arguments, or an interactive one that greets with a hint."""
+    if arguments:
+        return ["bash", *arguments]
+    return ["bash", "--rcfile", str(project.root / "tools" / "shell.bash"), "-i"]
+
+
+def _replace_process(command: list[str], env: dict[str, str]) -> int:
+    """Become the command, so that its signals and exit code are its own."""
+    sys.stdout.flush()
+    for ignored in (signal.SIGPIPE, signal.SIGXFSZ):
+        # Python ignores these, and what is ignored would stay ignored in the command.
+        signal.signal(ignored, signal.SIG_DFL)
+    os.execvpe(command[0], command, env)

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Composes the environment in which verbs run, without sourcing anything."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+
+from bootstrap.project import Environment, Project, Refusal
+
+DISTRIBUTION = "jazzy"
+WHEELS = "wheels"
+SYSTEM = "system"
+
+
+def without_other_sunpoint(env: Mapping[str, str]) -> dict[str, str]:
+    """A user's environment without what an enclosing `./sunpoint shell` put there, of this folder or another."""
+    home = env.get("SUNPOINT_HOME")
+    if not home:
+        return dict(env)
+    cleaned = {}
+    for name, value in env.items():
+        kept = [part for part in value.split(os.pathsep) if part != home and not part.startswith(home + os.sep)]
+        if kept:
+            cleaned[name] = os.pathsep.join(kept)
+    if env.get("SUNPOINT_ROS") == WHEELS:
+        cleaned.pop("ROS_DISTRO", None)
+    return cleaned
+
+
+def ros_source(env: Mapping[str, str]) -> str:
+    """Where ROS 2 comes from: `system` when a Jazzy installation is sourced, else `wheels`.
+
+    Raises Refusal when another distribution is sourced: its messages and libraries do not mix with Jazzy's.
+    """
+    distribution = env.get("ROS_DISTRO", "")
+    if distribution not in ("", DISTRIBUTION):
+        raise Refusal(
+            f"ROS 2 {distribution} is sourced in this shell; Sunpoint is for {DISTRIBUTION}",
+            "open a shell that sources no ROS, or: source /opt/ros/jazzy/setup.bash",
+        )
+    return SYSTEM if distribution and env.get("AMENT_PREFIX_PATH") else WHEELS
+
+
+def toolchain(project: Project, ros: str) -> Environment:
+    """The environment of the installed tools and ROS, before any package of the workspace is built."""
+    root, venv = project.root, project.venv
+    environment = Environment(
+        assign={
+            "SUNPOINT_HOME": str(root),
+            "SUNPOINT_ROS": ros,
+            "VIRTUAL_ENV": str(venv),
+            "ROS_DISTRO": DISTRIBUTION,
+            "ROS_VERSION": "2",
+            "ROS_PYTHON_VERSION": "3",
+        },
+        prepend={"PATH": [str(venv / "bin")]},
+    )
+    if ros == WHEELS:
+        # The wheels' start hook executes Python a second time to set LD_LIBRARY_PATH, unless told it is set.
+        environment.assign["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
+        site_packages = venv / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
+        libraries = sorted(str(folder) for folder in site_packages.glob("ros_*.libs"))
+        environment.prepend["LD_LIBRARY_PATH"] = [str(venv / "lib"), *libraries]
+        environment.prepend["AMENT_PREFIX_PATH"] = [str(venv)]
+        environment.prepend["CMAKE_PREFIX_PATH"] = [str(venv)]
+    return environment
+
+
+def compose(base: Mapping[str, str], environment: Environment) -> dict[str, str]:
+    """The user's environment with the changes applied, and defaults for what the user left open."""
+    env = dict(base)
+    env.pop("PYTHONHOME", None)
+    env.update(environment.assign)
+    for name, entries in environment.prepend.items():
+        rest = [part for part in env.get(name, "").split(os.pathsep) if part and part not in entries]
+        env[name] = os.pathsep.join([*entries, *rest])
+    root = environment.assign["SUNPOINT_HOME"]
+    env.setdefault("ROS_HOME", os.path.join(root, "log"))
+    env.setdefault("ROS_LOG_DIR", os.path.join(root, "log", "ros"))
+    env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    env.setdefault("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
+    env.setdefault("MPLBACKEND", "Agg")
+    return env
+
+
+def changes(before: Mapping[str, str], after: Mapping[str, str]) -> Environment:
+    """What turns `before` into `after`; values that are lists of absolute paths become entries to prepend."""
+    environment = Environment()
+    for name, value in after.items():
+        if value == before.get(name) or name in ("PWD", "OLDPWD", "SHLVL", "_"):
+            continue
+        parts = [part for part in value.split(os.pathsep) if part]
+        if name.endswith("PATH") and all(part.startswith(os.sep) for part in parts):
+            old = before.get(name, "").split(os.pathsep)
+            environment.prepend[name] = [part for part in parts if part not in old]
+        else:
+            environment.assign[name] = value
+    return environment

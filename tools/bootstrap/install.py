@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Makes the Python environment with ROS and everything else in it, from the lock files."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+
+from bootstrap import fingerprint, host, requirements, wheels
+from bootstrap.environment import SYSTEM, toolchain
+from bootstrap.progress import Step, say
+from bootstrap.work import Work
+
+
+def install(work: Work) -> None:
+    """Make the environment anew. Packages come out of the installer's cache when they were there before."""
+    project = work.project
+    host.check(work.ros, work.base)
+    log = work.log("install.log")
+    say("sunpoint: setting up inside this folder, needed once")
+    for folder in (project.venv, project.build, project.install):
+        # Scripts and CMake caches hold absolute paths and versions of what they were made with.
+        if folder.exists():
+            shutil.rmtree(folder)
+    _make_venv(work, log)
+    _install_packages(work, log)
+    if work.ros != SYSTEM:
+        with Step("adapting the ROS packages to this machine"):
+            wheels.mend_cmake_files(project.venv / "share", *_include_folders(work))
+    state = work.state
+    state.install, state.test, state.packages = fingerprint.installation(project, work.ros), "", {}
+    state.environment = toolchain(project, work.ros)
+    work.save()
+
+
+def install_tests(work: Work) -> None:
+    """Add the tools that only the tests need."""
+    with Step("installing the test tools") as step:
+        _uv(work, step, work.project.root / "requirements-test.lock", work.log("install-tests.log"), "--no-deps")
+    work.state.test = fingerprint.test_requirements(work.project)
+    work.save()
+
+
+def _make_venv(work: Work, log: Path) -> None:
+    if work.ros == SYSTEM:
+        command = [host.system_python(work.base), "-m", "venv", "--system-site-packages"]
+    else:
+        command = [getattr(sys, "_base_executable", sys.executable), "-m", "venv"]
+    lock = work.project.root / "requirements-uv.lock"
+    pip = [work.project.python, "-m", "pip", "install", "--disable-pip-version-check"]
+    with Step("making the Python environment") as step:
+        work.run(step, [*command, work.project.venv], log)
+        work.run(step, [*pip, "--require-hashes", "-r", lock], log)
+
+
+def _install_packages(work: Work, log: Path) -> None:
+    lock = work.project.root / "requirements.lock"
+    # The one package that exists as source only is built with the locked setuptools too.
+    options: list[str | Path] = ["--build-constraints", lock]
+    if work.ros == SYSTEM:
+        has_colcon = work.ask_python("import importlib.util as u; print(u.find_spec('colcon_core') is not None)")
+        filtered = work.project.venv / "requirements-system.lock"
+        filtered.write_text(requirements.for_system(lock.read_text(), has_colcon == "True"))
+        lock, options = filtered, [*options, "--no-deps"]
+    with Step("installing packages (about 300 MB to download the first time)") as step:
+        _uv(work, step, lock, log, *options)
+
+
+def _uv(work: Work, step: Step, lock: Path, log: Path, *options: str | Path) -> None:
+    uv = [work.project.venv / "bin" / "uv", "pip", "install", "--python", work.project.python]
+    work.run(step, [*uv, "--require-hashes", "-r", lock, *options], log)
+
+
+def _include_folders(work: Work) -> tuple[str, str]:
+    """The include folders of Python and numpy, as the environment itself names them."""
+    python, numpy = json.loads(
+        work.ask_python(
+            "import json, numpy, sysconfig; print(json.dumps([sysconfig.get_path('include'), numpy.get_include()]))"
+        )
+    )
+    return python, numpy

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The verbs of `./sunpoint`: thin names for executables of the ROS packages, and the help."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+
+class Verb(NamedTuple):
+    """One verb; without a package it is done by the bootstrap itself."""
+
+    summary: str
+    package: str = ""
+    executable: str = ""
+
+
+VERBS = {
+    "demo": Verb("fly a short mission and show what happens, no arguments needed", "css_bringup", "demo"),
+    "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly"),
+    "replay": Verb("step estimators over a recorded bag and compare", "css_bringup", "replay"),
+    "bench": Verb("measure the speed of graph, replay and Monte Carlo", "css_bringup", "bench"),
+    "record": Verb("record topics into an MCAP bag", "css_recording", "recorder"),
+    "play": Verb("play a bag onto live topics", "css_recording", "player"),
+    "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
+    "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
+    "coverage": Verb("map how well a cell layout sees the Sun", "css_studies", "coverage"),
+    "test": Verb("run ruff, mypy and all tests; arguments go to pytest"),
+    "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
+}
+
+
+def help_text() -> str:
+    """What `./sunpoint --help` prints."""
+    width = max(map(len, VERBS))
+    table = "\n".join(f"  {name:{width}}  {verb.summary}" for name, verb in VERBS.items())
+    return f"""Sunpoint: sun-sensing flight software on ROS 2 Jazzy. Simulated sun sensors, sun-heading
+estimators, sun-pointing control, recording and replay, each a real ROS 2 node.
+
+Quick start (the first command sets everything up inside this folder, once):
+  ./sunpoint demo
+  ./sunpoint shell        then: ros2 pkg executables css_estimation
+
+Usage: ./sunpoint VERB [ARGUMENTS]
+{table}
+
+./sunpoint VERB --help explains one verb."""
+
+
+def unknown_verb(name: str) -> str:
+    """The message for a verb that does not exist, with the nearest one that does."""
+    import difflib  # only a mistyped verb pays for this import
+
+    near = difflib.get_close_matches(name, VERBS, n=1, cutoff=0.5)
+    hint = f"did you mean '{near[0]}'?" if near else "./sunpoint --help lists the verbs"
+    return f"sunpoint: unknown verb '{name}'; {hint}"
