@@ -184,12 +184,20 @@ class Codec:
         """Names of the fields of unbounded length."""
         return tuple(f.name for f in self.fields if f.count == 0)
 
-    def first_not_finite(self, sample: Sample) -> str | None:
-        """Name of the first field that holds a NaN or an infinity."""
+    def real_fields(self, names: tuple[str, ...] = ()) -> list[_Field]:
+        """The fields of floating-point numbers, all or those named.
+
+        Raises:
+            KeyError: a name that the type does not have.
+        """
+        by_name = {f.name: f for f in self.fields}
+        return [f for f in ([by_name[n] for n in names] or self.fields) if f.code in "df"]
+
+    @staticmethod
+    def first_not_finite(fields: list[_Field], sample: Sample) -> str | None:
+        """Name of the first of some `real_fields` that holds a NaN or an infinity."""
         values = sample.__dict__
-        for field in self.fields:
-            if field.code not in "df":
-                continue
+        for field in fields:
             value = values[field.name]
             if field.count is None:
                 if not math.isfinite(value):

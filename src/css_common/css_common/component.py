@@ -12,7 +12,7 @@ from typing import Any, ClassVar
 
 from css_common.codec import Sample
 from css_common.epochs import parse_utc
-from css_common.schema import Parameter, Table, Values
+from css_common.schema import Table, Values
 from css_common.sections import SECTIONS
 
 BODY = "body"
@@ -30,6 +30,7 @@ class Input:
         required: without it there is no cycle; an optional input may be silent in real time (a dead gyro).
         divider: a message is due every `divider` steps.
         lengths: expected length of array fields; another length is refused at the edge.
+        used: fields that the component reads and that must be finite; empty: all. Drivers leave NaN in others.
         frame: whose frame_id is expected, `BODY` or `INERTIAL`.
     """
 
@@ -39,6 +40,7 @@ class Input:
     required: bool = True
     divider: int = 1
     lengths: Mapping[str, int] = field(default_factory=dict)
+    used: tuple[str, ...] = ()
     frame: str = BODY
 
 
@@ -146,15 +148,3 @@ class Plant(Component):
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         """Inputs stamped k (None: the partner is lost) to the messages stamped k + 1; sets `finished` at the end."""
         raise NotImplementedError
-
-
-def own_parameter(component: type[Component], name: str) -> Parameter:
-    """Specification of one parameter of a component.
-
-    Raises:
-        KeyError: it has no such parameter.
-    """
-    for parameter in component.table():
-        if parameter.name == name:
-            return parameter
-    raise KeyError(name)

@@ -128,6 +128,8 @@ IO: Table = (
     real("io.deadline", 0.5, "s", "age at which an input counts as silent", low=0.001, tunable=True),
     text("io.body_frame", "bus", "frame_id of body-frame messages"),
     text("io.inertial_frame", "eci", "frame_id of inertial messages"),
+    texts("io.accepted_frames", (), "further frame_ids taken for the expected one, as hardware drivers name them"),
+    real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001),
     flag("autostart", True, "configure and activate without being asked"),
 )
 

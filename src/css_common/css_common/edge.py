@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What stands between a topic and a component: no message passes that could harm it.
+
+Shared by live nodes and replay. Rejections are counted by kind; the first of each kind is reported.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable
+
+from css_common.codec import DecodeError, Sample, codec_of
+from css_common.component import INERTIAL, Component, Input
+from css_common.schema import Values
+
+Report = Callable[[str], None]
+_CONFIRMATIONS = 3
+
+
+class StampGuard:
+    """Lets stamps pass that go forward by a sane amount.
+
+    A stamp that repeats or goes back is refused, and so is one far ahead: a single damaged stamp must not lock
+    out all that follow. When several messages in a row agree on a new time, the sender's clock really was set, or
+    a recording started over, and the guard follows.
+    """
+
+    def __init__(self, largest_gap_ns: int) -> None:
+        self.largest_gap_ns = largest_gap_ns
+        self.last: int | None = None
+        self._candidate: int | None = None
+        self._agreeing = 0
+
+    def refusal(self, stamp_ns: int) -> str | None:
+        """Why a stamp is refused (`stamp_repeated`, `stamp_back`, `stamp_jump`), or None when it may pass."""
+        last = self.last
+        if last is None or 0 < stamp_ns - last <= self.largest_gap_ns:
+            self.last = stamp_ns
+            self._candidate = None
+            return None
+        if stamp_ns == last:
+            return "stamp_repeated"
+        candidate = self._candidate
+        if candidate is not None and 0 < stamp_ns - candidate <= self.largest_gap_ns:
+            self._agreeing += 1
+        else:
+            self._agreeing = 1
+        self._candidate = stamp_ns
+        if self._agreeing > _CONFIRMATIONS:
+            self.last = stamp_ns
+            self._candidate = None
+            return None
+        return "stamp_back" if stamp_ns < last else "stamp_jump"
+
+
+class Edge:
+    """Checks the messages of one input."""
+
+    def __init__(self, source: Input, values: Values, report: Report) -> None:
+        """Prepares the checks.
+
+        Args:
+            source: the input.
+            values: the node's values (section io).
+            report: called with one line at the first rejection of each kind.
+        """
+        self.source = source
+        self.codec = codec_of(source.message_type)
+        self.accepted = 0
+        self.rejected: Counter[str] = Counter()
+        io = values.io
+        expected = io.inertial_frame if source.frame == INERTIAL else io.body_frame
+        self.frames = frozenset((expected, *io.accepted_frames))
+        self.expected_frame = expected
+        self.guard = StampGuard(round(io.largest_gap * 1e9))
+        self._finite_fields = self.codec.real_fields(source.used)
+        self._report = report
+
+    def accept(self, data: bytes) -> Sample | None:
+        """The message in `data`, or None when it was rejected."""
+        try:
+            sample = self.codec.decode(data)
+        except DecodeError as error:
+            return self._reject("malformed", str(error))
+        for name, length in self.source.lengths.items():
+            given = len(getattr(sample, name))
+            if given != length:
+                return self._reject("wrong_length", f"{given} {name} given, expected {length}")
+        if sample.frame_id not in self.frames:
+            return self._reject(
+                "wrong_frame", f"frame_id {sample.frame_id!r} given, expected {self.expected_frame!r}"
+            )
+        bad = self.codec.first_not_finite(self._finite_fields, sample)
+        if bad is not None:
+            return self._reject("not_finite", f"{bad} holds NaN or infinity")
+        # last, so that a rejected message does not move the clock that its successors are measured by
+        refusal = self.guard.refusal(sample.stamp_ns)
+        if refusal is not None:
+            return self._reject(
+                refusal, f"stamp {sample.stamp_ns} ns given, last accepted {self.guard.last} ns"
+            )
+        self.accepted += 1
+        return sample
+
+    def _reject(self, kind: str, detail: str) -> None:
+        self.rejected[kind] += 1
+        if self.rejected[kind] == 1:
+            self._report(f"{self.source.topic}: {kind}: {detail} (further ones are counted, not reported)")
+
+
+class Matcher:
+    """Brings the inputs of one cycle together by their stamps."""
+
+    def __init__(self, component: Component, inputs: Iterable[Input], awaited: Iterable[str]) -> None:
+        """Prepares the matching.
+
+        Args:
+            component: whose steps decide which inputs are due.
+            inputs: all inputs; the first one paces the cycle when matching by the latest.
+            awaited: keys without which an exact cycle does not run (required ones, and optional ones that
+                have a publisher).
+        """
+        self.inputs = {i.key: i for i in inputs}
+        self.awaited = frozenset(awaited)
+        self.exact = component.values.io.input_matching == "exact"
+        self.deadline_ns = round(component.values.io.deadline * 1e9)
+        self.unmatched = 0
+        self._pacing = next(iter(self.inputs), None)
+        self._component = component
+        self._divided = any(i.divider > 1 for i in self.inputs.values())
+        self._pending: dict[int, dict[str, Sample]] = {}
+        self._latest: dict[str, Sample] = {}
+        self._done = -1
+
+    def offer(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
+        """Takes a message; returns the cycles that are now complete, oldest first."""
+        if not self.exact:
+            return self._offer_latest(key, sample)
+        stamp = sample.stamp_ns
+        if stamp <= self._done:
+            if self._done - stamp < self.deadline_ns:
+                self.unmatched += 1  # its cycle has run without it
+                return []
+            self.restart()  # the edge lets stamps far back pass only when the sender's clock was set back
+        slots = self._pending.setdefault(stamp, {})
+        slots[key] = sample
+        if len(slots) < self._due(stamp):
+            if len(self._pending) > 64:
+                self.unmatched += len(self._pending.pop(min(self._pending)))
+            return []
+        return [self._complete(stamp)]
+
+    def overdue(self) -> list[tuple[int, dict[str, Sample | None]]]:
+        """Cycles that have all required inputs and wait for optional ones alone, oldest first; called at a deadline."""
+        ready = []
+        for stamp in sorted(self._pending):
+            slots = self._pending.get(stamp)
+            if slots is not None and all(k in slots for k, i in self.inputs.items() if i.required):
+                ready.append(self._complete(stamp))
+        return ready
+
+    def missing(self) -> list[str]:
+        """Topics that the oldest incomplete cycle still waits for."""
+        if not self._pending:
+            return [i.topic for i in self.inputs.values() if i.key in self.awaited]
+        slots = self._pending[min(self._pending)]
+        return [i.topic for k, i in self.inputs.items() if k in self.awaited and k not in slots]
+
+    def restart(self) -> None:
+        """Forgets what was received."""
+        self._pending.clear()
+        self._latest.clear()
+        self._done = -1
+
+    def _due(self, stamp: int) -> int:
+        if not self._divided:
+            return len(self.awaited)
+        step = self._component.step_of(stamp)
+        return sum(step % self.inputs[key].divider == 0 for key in self.awaited)
+
+    def _complete(self, stamp: int) -> tuple[int, dict[str, Sample | None]]:
+        slots = self._pending.pop(stamp)
+        for older in [s for s in self._pending if s < stamp]:
+            self.unmatched += len(self._pending.pop(older))
+        self._done = stamp
+        return stamp, {key: slots.get(key) for key in self.inputs}
+
+    def _offer_latest(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
+        self._latest[key] = sample
+        if key != self._pacing:
+            return []
+        stamp = sample.stamp_ns
+        received = {}
+        for name, entry in self.inputs.items():
+            held = self._latest.get(name)
+            fresh = held is not None and abs(stamp - held.stamp_ns) <= self.deadline_ns
+            if entry.required and not fresh:
+                self.unmatched += 1
+                return []
+            received[name] = held if fresh else None
+        return [(stamp, received)]
