@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Orbit, Sun, Earth rotation, eclipse, magnetic field and albedo, for the simulated truth and for flight software alike."""
+"""Orbit, Sun, Earth rotation, eclipse, magnetic field and albedo, for simulated truth and flight software."""

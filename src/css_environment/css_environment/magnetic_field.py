@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Geomagnetic main field: IGRF-14 (ppigrf), 1900 to 2030."""
+
+from datetime import UTC, datetime
+
+import numpy as np
+
+from css_environment.constants import EARTH_ROTATION_RATE
+
+
+def field_along_orbit(r_n: np.ndarray, elapsed_s: np.ndarray, dcm_en, date_ns: int) -> np.ndarray:
+    """Field in n [T], (T, 3), at positions `r_n` [m], (T, 3).
+
+    `dcm_en` is the rotation from n to e at elapsed time zero, from where the Earth turns with `elapsed_s`;
+    `date_ns` (UTC, ns) fixes the secular variation, which is about 100 nT a year: one date does for a day.
+    """
+    import ppigrf  # here: it loads pandas, which missions without a magnetometer need not wait for
+
+    angle = EARTH_ROTATION_RATE * np.asarray(elapsed_s, dtype=float)
+    cos_a, sin_a = np.cos(angle), np.sin(angle)
+    x, y, z = np.asarray(dcm_en) @ np.asarray(r_n, dtype=float).T
+    longitude = np.arctan2(y, x) - angle
+    radius = np.sqrt(x * x + y * y + z * z)
+    colatitude = np.arctan2(np.hypot(x, y), z)
+    # On the axis the spherical components have no meaning: stay a millimetre away from it.
+    colatitude = np.clip(colatitude, 1e-9, np.pi - 1e-9)
+    up, south, east = ppigrf.igrf_gc(
+        radius / 1e3,
+        np.degrees(colatitude),
+        np.degrees(longitude),
+        datetime.fromtimestamp(date_ns / 1e9, tz=UTC).replace(tzinfo=None),
+    )
+    up, south, east = np.ravel(up), np.ravel(south), np.ravel(east)
+    outward = up * np.sin(colatitude) + south * np.cos(colatitude)
+    cos_l, sin_l = np.cos(longitude), np.sin(longitude)
+    field_x = outward * cos_l - east * sin_l
+    field_y = outward * sin_l + east * cos_l
+    field_z = up * np.cos(colatitude) - south * np.sin(colatitude)
+    # Back from the turned Earth to its orientation at elapsed time zero, then to n.
+    field_e0 = np.stack((cos_a * field_x - sin_a * field_y, sin_a * field_x + cos_a * field_y, field_z), 1)
+    return 1e-9 * field_e0 @ np.asarray(dcm_en)
