@@ -48,11 +48,16 @@ def conical_illumination(
         return 0.0
     if separation <= sun - earth:
         return 1.0 - (earth / sun) ** 2
-    x = (separation * separation + sun * sun - earth * earth) / (2.0 * separation)
-    y = math.sqrt(max(0.0, sun * sun - x * x))
-    covered = (
-        sun * sun * math.acos(max(-1.0, min(1.0, x / sun)))
-        + earth * earth * math.acos(max(-1.0, min(1.0, (separation - x) / earth)))
-        - separation * y
-    )
+    # Both discs end at the common chord, x from the Sun's centre and 2 y long. Written with differences and
+    # arc tangents: the textbook arc cosines lose half the digits where the discs only touch.
+    x = 0.5 * (sun * sun + (separation - earth) * (separation + earth)) / separation
+    y = math.sqrt(max(0.0, (sun - x) * (sun + x)))
+    covered = _segment_area(sun, x, y) + _segment_area(earth, separation - x, y)
     return max(0.0, min(1.0, 1.0 - covered / (math.pi * sun * sun)))
+
+
+@kernel
+def _segment_area(radius: float, x: float, y: float) -> float:
+    """Area of the part of a disc beyond a chord of half length y at the distance x from the centre."""
+    half_angle = math.atan2(y, x)
+    return radius * radius * half_angle - x * y
