@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The folder of a recording on disk: making it, replacing it, and writing into it so that it lasts."""
+
+import os
+from pathlib import Path
+from typing import IO
+
+from css_recording.bag_metadata import METADATA_FILE
+from css_recording.errors import BagError
+
+
+def prepare_folder(folder: Path, overwrite: bool) -> None:
+    """Make the folder; refuse one that holds something, unless it is a recording that may be replaced."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        contents = sorted(folder.iterdir())
+        if not contents:
+            return
+        if not overwrite:
+            raise BagError(f"{folder}: already exists and is not empty; choose another name or overwrite it")
+        foreign = [path.name for path in contents if not _belongs_to_bag(path)]
+        if foreign:
+            raise BagError(f"{folder}: holds {foreign[0]}, which is no part of a recording; not overwritten")
+        # The metadata go first: what is left after an interruption does not look finished.
+        for path in sorted(contents, key=lambda path: path.name != METADATA_FILE):
+            path.unlink()
+    except OSError as error:
+        raise BagError(f"{folder}: cannot create the recording: {error.strerror}") from error
+
+
+def create_file(path: Path) -> IO[bytes]:
+    """Open a new file for writing; one that exists, perhaps another recorder's, is refused."""
+    try:
+        return path.open("xb")
+    except OSError as error:
+        raise BagError(f"{path}: cannot create the recording: {error.strerror}") from error
+
+
+def write_atomically(path: Path, text: str) -> None:
+    """Write a text file so that, whatever happens, it has its old contents or the new ones."""
+    temporary = _temporary(path)
+    with temporary.open("w", encoding="utf-8") as file:
+        file.write(text)
+        file.flush()
+        os.fsync(file.fileno())
+    temporary.replace(path)
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename or a new name in the folder outlast a power failure."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
+
+
+def _temporary(path: Path) -> Path:
+    return path.with_name(f".{path.name}.new")
+
+
+def _belongs_to_bag(path: Path) -> bool:
+    own_names = (METADATA_FILE, _temporary(Path(METADATA_FILE)).name)
+    return path.is_file() and (path.name in own_names or path.suffix in (".mcap", ".db3"))

@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writes a recording: a rosbag2 folder with one MCAP file, from serialised messages and simulated stamps.
+
+The log time of a message is its stamp, never the wall clock, and nothing else in the file depends on when or
+where it was written. Messages are held until their simulated second is over, sorted by stamp and topic, and
+written as one chunk that is handed to the operating system at once. The same flight therefore gives the same
+bytes, in whatever order its messages arrived, and a killed recorder loses its open second and nothing more.
+
+A finished recording is one that has a `metadata.yaml`: it is written last, under another name, and renamed.
+"""
+
+import os
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Self
+
+from mcap.writer import CompressionType, Writer
+
+from css_recording.bag_folder import create_file, prepare_folder, write_atomically
+from css_recording.bag_metadata import (
+    METADATA_FILE,
+    BagSummary,
+    Topic,
+    absolute,
+    bag_information,
+    metadata_text,
+    qos_text,
+    serialized_metadata,
+)
+from css_recording.errors import BagError
+from css_recording.schemas import MessageSchema, schema_of
+from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
+
+LIBRARY = "sunpoint css_recording"
+METADATA_RECORD = "sunpoint"
+_MAX_CHUNK_BYTES = 1 << 20
+
+
+class BagWriter:
+    """A recording being written.
+
+    Parameters
+    ----------
+    folder: the recording. The file in it is called `<folder name>_0.mcap`.
+    topics: in the order in which messages of equal stamp are stored.
+    metadata: texts kept in the file's record `sunpoint` (mission, versions, ...).
+    overwrite: replace a recording that is there. A folder that holds anything else is always refused.
+    limits: how long messages are held to be put in order.
+    ros_distro: default: the one that is sourced, else jazzy.
+
+    Every method raises `BagError` when the disk refuses. The recording is then over, and what was written
+    before can be recovered.
+    """
+
+    def __init__(
+        self,
+        folder: str | Path,
+        topics: Iterable[Topic] = (),
+        metadata: Mapping[str, str] | None = None,
+        *,
+        overwrite: bool = False,
+        limits: BufferLimits = BufferLimits(),  # noqa: B008 (immutable)
+        ros_distro: str | None = None,
+    ) -> None:
+        self.folder = Path(folder).absolute()
+        self.path = self.folder / f"{self.folder.name}_0.mcap"
+        self._ros_distro = ros_distro or os.environ.get("ROS_DISTRO", "jazzy")
+        self._topics: list[Topic] = []
+        self._schemas: list[MessageSchema] = []
+        self._schema_ids: dict[MessageSchema, int] = {}
+        self._index: dict[str, int] = {}
+        self._channel_ids: list[int] = []
+        self._counts: list[int] = []
+        self._start_ns = self._end_ns = 0
+        self._buffer = SecondBuffer(limits)
+        self._failure: str | None = None
+        prepare_folder(self.folder, overwrite)
+        self._file: IO[bytes] | None = create_file(self.path)
+        # Summary offsets are optional, and the library writes one that points to nothing when a file has no
+        # attachment, which checkers of the format report as an error.
+        self._writer = Writer(
+            self._file,
+            chunk_size=_MAX_CHUNK_BYTES,
+            compression=CompressionType.ZSTD,
+            use_summary_offsets=False,
+        )
+        try:
+            self._writer.start(profile="ros2", library=LIBRARY)
+            if metadata:
+                self._writer.add_metadata(METADATA_RECORD, dict(metadata))
+            self._file.flush()
+            for topic in topics:
+                self.add_topic(topic)
+        except OSError as error:
+            raise self._fail(error) from error
+        except BagError:
+            self._abandon()
+            raise
+
+    @property
+    def topics(self) -> tuple[Topic, ...]:
+        """Topics in the order in which equal stamps are stored."""
+        return tuple(self._topics)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages received so far for each topic."""
+        counts = {topic.name: count for topic, count in zip(self._topics, self._counts, strict=True)}
+        for message in self._buffer.held():
+            counts[self._topics[message[1]].name] += 1
+        return counts
+
+    @property
+    def late_messages(self) -> int:
+        """Messages that came after their simulated second was on disk. They are kept, out of order."""
+        return self._buffer.late_messages
+
+    @property
+    def closed(self) -> bool:
+        """Whether the recording is over, finished or failed."""
+        return self._file is None
+
+    def add_topic(self, topic: Topic) -> None:
+        """Make a topic known. Repeating it with the same type changes nothing."""
+        self._check_open()
+        name = absolute(topic.name)
+        if name in self._index:
+            known = self._topics[self._index[name]].type
+            if known != topic.type:
+                raise BagError(f"{self.folder}: topic {name} is recorded as {known}, not as {topic.type}")
+            return
+        schema = topic.schema or schema_of(topic.type)
+        if schema not in self._schema_ids:
+            self._schema_ids[schema] = self._writer.register_schema(
+                schema.type_name, "ros2msg", schema.text.encode()
+            )
+        channel = self._writer.register_channel(
+            name,
+            "cdr",
+            self._schema_ids[schema],
+            {"offered_qos_profiles": qos_text(topic.qos), "topic_type_hash": schema.type_hash},
+        )
+        self._index[name] = len(self._topics)
+        self._topics.append(topic._replace(name=name))
+        self._schemas.append(schema)
+        self._channel_ids.append(channel)
+        self._counts.append(0)
+
+    def write(self, topic: str, stamp_ns: int, data: bytes, publish_time_ns: int | None = None) -> None:
+        """Record one serialised message.
+
+        topic: absolute name of a topic that was added.
+        stamp_ns: [ns since 1970, simulated UTC] log time; not negative.
+        data: little-endian CDR with its four-byte header.
+        publish_time_ns: default: the stamp.
+        """
+        index = self._index.get(topic)
+        if index is None or stamp_ns < 0 or self._file is None:
+            self._check_open()
+            reason = "was not added to the recording" if index is None else f"stamp {stamp_ns} before 1970"
+            raise BagError(f"{self.folder}: topic {topic}: {reason}")
+        publish_time_ns = stamp_ns if publish_time_ns is None else publish_time_ns
+        batches = self._buffer.add((stamp_ns, index, data, publish_time_ns))
+        if batches:
+            self._store(batches)
+
+    def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
+        """Store a named set of texts at once, between the messages: an event, a parameter that changed."""
+        self._check_open()
+        try:
+            self._writer.add_metadata(name, dict(entries))
+            self._writer.flush()
+        except OSError as error:
+            raise self._fail(error) from error
+
+    def attach(self, name: str, media_type: str, data: bytes, stamp_ns: int) -> None:
+        """Store a file in the recording."""
+        self._check_open()
+        try:
+            self._writer.add_attachment(stamp_ns, stamp_ns, name, media_type, data)
+            self._writer.flush()
+        except OSError as error:
+            raise self._fail(error) from error
+
+    def flush(self) -> None:
+        """Hand everything received so far to the operating system; more of the same seconds will be late."""
+        self._check_open()
+        self._store(self._buffer.drain())
+
+    def close(self) -> None:
+        """Finish the recording. Closing it again does nothing."""
+        if self._file is None:
+            return
+        self.flush()
+        summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, self._ros_distro)
+        information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
+        try:
+            # One record only: of several, some readers take the first and others the last.
+            self._writer.add_metadata("rosbag2", {"serialized_metadata": serialized_metadata(information)})
+            self._writer.finish()
+            self._file.flush()
+            os.fsync(self._file.fileno())
+            self._file.close()
+            write_atomically(self.folder / METADATA_FILE, metadata_text(information))
+        except OSError as error:
+            raise self._fail(error) from error
+        self._file = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if value is None:
+            self.close()
+        else:
+            with suppress(BagError):  # the first error is the one to hear about
+                self.close()
+
+    def _store(self, batches: list[list[Message]]) -> None:
+        """Write each batch as a chunk, or several when it exceeds the size of one."""
+        channel_ids, counts, add_message = self._channel_ids, self._counts, self._writer.add_message
+        try:
+            for batch in batches:
+                is_first = not any(counts)
+                for stamp_ns, index, data, publish_time_ns in batch:
+                    counts[index] += 1
+                    sequence = counts[index] & 0xFFFFFFFF
+                    add_message(channel_ids[index], stamp_ns, data, publish_time_ns, sequence)
+                self._writer.flush()
+                self._start_ns = batch[0][0] if is_first else min(self._start_ns, batch[0][0])
+                self._end_ns = max(self._end_ns, batch[-1][0])
+        except OSError as error:
+            raise self._fail(error) from error
+
+    def _check_open(self) -> None:
+        if self._file is None:
+            raise BagError(self._failure or f"{self.folder}: the recording is closed")
+
+    def _fail(self, error: OSError) -> BagError:
+        self._failure = (
+            f"{self.path}: cannot write the recording: {error.strerror or error}; "
+            f"`recover {self.folder}` keeps what was written before"
+        )
+        self._abandon()
+        return BagError(self._failure)
+
+    def _abandon(self) -> None:
+        """Let go of the file without finishing it."""
+        if self._file is not None:
+            with suppress(OSError):
+                self._file.close()
+            self._file = None

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Definition text and type hash of any installed message type, as recordings carry them.
+
+A recording explains itself: each of its types comes with the text of its `.msg` file and of every type it is
+made of (`ros2msg` encoding), and with the hash that ROS 2 computes over the same (RIHS01, REP-2016), so that
+a reader can tell whether its own definition is the recorded one.
+"""
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from css_recording.errors import BagError
+
+_SEPARATOR = "=" * 80
+_PRIMITIVES = frozenset(
+    ["bool", "byte", "char", "string", "wstring", "float32", "float64"]
+    + [f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)]
+)
+
+
+class MessageSchema(NamedTuple):
+    """What a recording says about a message type."""
+
+    type_name: str  # "std_msgs/msg/Header"
+    text: str  # definition with all dependencies, "ros2msg" encoding
+    type_hash: str  # "RIHS01_..."; empty when the source of the definition did not say
+
+
+def split_type_name(type_name: str) -> tuple[str, str]:
+    """Package and name of a message type such as "std_msgs/msg/Header"."""
+    parts = type_name.split("/")
+    if len(parts) != 3 or parts[1] != "msg" or not all(parts):
+        raise BagError(f"'{type_name}' is not a message type; expected PACKAGE/msg/NAME")
+    return parts[0], parts[2]
+
+
+def dependencies(type_name: str, text: str) -> list[str]:
+    """Full names of the types that the fields of one `.msg` text use, in order, each once."""
+    package, _ = split_type_name(type_name)
+    found: dict[str, None] = {}
+    for line in text.splitlines():
+        words = line.split("#", 1)[0].split()
+        if not words:
+            continue
+        base = words[0].split("[", 1)[0].split("<=", 1)[0]
+        if base in _PRIMITIVES:
+            continue
+        parts = base.split("/")
+        found[f"{parts[0] if len(parts) > 1 else package}/msg/{parts[-1]}"] = None
+    return list(found)
+
+
+@cache
+def schema_of(type_name: str) -> MessageSchema:
+    """Schema of an installed message type; raises `BagError` when the type is not installed."""
+    texts = {type_name: _definition_text(type_name)}
+    waiting = dependencies(type_name, texts[type_name])
+    while waiting:
+        name = waiting.pop(0)
+        if name not in texts:
+            texts[name] = _definition_text(name)
+            waiting += dependencies(name, texts[name])
+    parts = [texts.pop(type_name)]
+    for name, text in texts.items():
+        parts.append(f"{_SEPARATOR}\nMSG: {'/'.join(split_type_name(name))}\n{text}")
+    full_text = "\n".join(part.rstrip("\n") for part in parts) + "\n"
+    return MessageSchema(type_name, full_text, _installed_hash(type_name) or hash_of(type_name, full_text))
+
+
+def hash_of(type_name: str, text: str) -> str:
+    """RIHS01 hash computed from a `ros2msg` schema text with all its dependencies."""
+    # The root type comes last: its text ends where the first separator begins, and get_types_from_msg reads
+    # each of the parts under its own name.
+    types = {}
+    root, *others = text.split(f"{_SEPARATOR}\nMSG: ")
+    types.update(get_types_from_msg(root, type_name))
+    for other in others:
+        name, _, definition = other.partition("\n")
+        package, base = name.strip().split("/")[0], name.strip().split("/")[-1]
+        types.update(get_types_from_msg(definition, f"{package}/msg/{base}"))
+    store = get_typestore(Stores.EMPTY)
+    store.register(types)
+    return str(store.hash_rihs01(type_name))
+
+
+def _share_file(type_name: str, suffix: str) -> Path:
+    package, name = split_type_name(type_name)
+    try:
+        share = get_package_share_directory(package)
+    except (PackageNotFoundError, LookupError, ValueError) as error:
+        raise BagError(
+            f"message type {type_name}: package {package} is not installed (searched AMENT_PREFIX_PATH)"
+        ) from error
+    return Path(share, "msg", name + suffix)
+
+
+def _definition_text(type_name: str) -> str:
+    path = _share_file(type_name, ".msg")
+    try:
+        return path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise BagError(f"message type {type_name} is not installed: cannot read {path}") from error
+
+
+def _installed_hash(type_name: str) -> str | None:
+    """Hash that the message generators wrote beside the definition, if they did."""
+    try:
+        description = json.loads(_share_file(type_name, ".json").read_text(encoding="utf-8"))
+    except OSError:
+        return None
+    for entry in description["type_hashes"]:
+        if entry["type_name"] == type_name:
+            return str(entry["hash_string"])
+    return None
