@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The coarse sun sensor cells as an estimator knows them: normals, view cone, hidden half space."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.schema import Values
+from css_common.vectors import Vec3
+
+# A normal this close to the clipping plane lies in it: rounding must not hide half of such a cell's view.
+_IN_PLANE = 1e-9
+
+
+class CellLayout(NamedTuple):
+    """Geometry of N cells."""
+
+    normals_b: np.ndarray  # (N, 3) outward unit normals
+    side: np.ndarray  # (N,) component of each normal along the clip normal; 0: the cell is not clipped
+    clip_normal_b: Vec3  # [-] normal of the plane that hides the other half space; zeros: none
+    cos_half_view: float  # [-] cosine of half the view cone
+
+
+def cell_layout(values: Values) -> CellLayout:
+    """Layout of the mission's `cells` section."""
+    normals_b = np.ascontiguousarray(values.cells.normals, dtype=np.float64)
+    clip_normal_b = np.asarray(values.cells.clip_normal, dtype=np.float64)
+    side = normals_b @ clip_normal_b
+    side[np.abs(side) < _IN_PLANE] = 0.0
+    x, y, z = (float(c) for c in clip_normal_b)
+    cos_half_view = math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
+    return CellLayout(normals_b, side, (x, y, z), cos_half_view)
+
+
+@kernel
+def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
+    """True when a source in unit direction `direction_b` is in the view of cell `i`.
+
+    It is inside the cone about the normal and on the cell's own side of the clipping plane
+    (O'Keefe & Schaub 2013, Fig. 1).
+    """
+    n, d = layout.normals_b, direction_b
+    if n[i, 0] * d[0] + n[i, 1] * d[1] + n[i, 2] * d[2] < layout.cos_half_view:
+        return False
+    side = layout.side[i]
+    if side == 0.0:
+        return True
+    c = layout.clip_normal_b
+    return side * (c[0] * d[0] + c[1] * d[1] + c[2] * d[2]) > 0.0
+
+
+@kernel
+def brightest(voltages) -> int:
+    """Index of the largest finite output; -1 when no output is above zero."""
+    index = -1
+    largest = 0.0
+    for i in range(voltages.shape[0]):
+        # a NaN compares false
+        if voltages[i] > largest and voltages[i] < math.inf:
+            largest = voltages[i]
+            index = i
+    return index

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every Sun estimator returns, and the shape that all of them share.
+
+A Sun estimator is a module with a `PARAMETERS` table, `parameters(values)`, `initial_state(p)` and the kernel
+
+    step(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted) -> (state, SunHeading)
+
+with `dt` [s] since the last step, `voltages` (N,) [-], `gyro_b` [rad/s], `gyro_valid` a bool and
+`eclipse_predicted` one of the `PREDICTION_*` constants. Node, replay and Monte Carlo need nothing else of it.
+"""
+
+from typing import NamedTuple
+
+from css_common.vectors import Vec3
+
+# The numbers of css_msgs/SunEstimate.
+VALIDITY_NONE = 0
+VALIDITY_HELD = 1
+VALIDITY_VALID = 2
+
+RATE_NONE = 0
+RATE_GYRO = 1
+RATE_SUN = 2
+RATE_FIELD = 3
+
+ECLIPSE_SUNLIT = 0
+ECLIPSE_ECLIPSED = 1
+
+# What an orbit model says about the shadow, if there is one.
+PREDICTION_UNKNOWN = -1
+PREDICTION_SUNLIT = 0
+PREDICTION_ECLIPSED = 1
+
+Covariance = tuple[float, float, float, float, float, float, float, float, float]
+"""Covariance of sun_b, row-major."""
+
+NO_COVARIANCE: Covariance = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+class SunHeading(NamedTuple):
+    """Direction to the Sun and body rate after one cycle of an estimator; see css_msgs/SunEstimate."""
+
+    sun_b: Vec3  # [-] unit vector, zeros while there has been no estimate
+    covariance: Covariance  # [-] of sun_b; first element -1: not estimated
+    omega_bn_b: Vec3  # [rad/s] low-pass filtered body rate
+    age: float  # [s] since a cell last contributed
+    nis: float  # [-] normalised innovation squared of this cycle
+    nis_dof: int  # degrees of freedom of nis
+    lit_mask: int  # bit i: cell i contributed
+    validity: int  # VALIDITY_*
+    rate_source: int  # RATE_*
+    eclipse: int  # ECLIPSE_*
+    mode: int  # documented with the estimator

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kalman filter on the Sun direction: prediction, update, constraint (O'Keefe & Schaub 2013, Eqs. 3-14).
+
+The state is the unit vector sun_b, an update takes one cell at a time: cells err independently, so updates in
+sequence equal the stacked one of the paper, without a matrix inverse.
+"""
+
+from css_common.attitude import rotation_vector_to_dcm
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, dot, multiply, norm, scale
+from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, trace
+
+
+@kernel
+def propagate(
+    sun_b: Vec3, covariance: Symmetric, omega_bn_b: Vec3, dt: float, process_noise: float
+) -> tuple[Vec3, Symmetric]:
+    """State and covariance after `dt` [s] at constant rate [rad/s], exactly (Eqs. 5, 7, 8)."""
+    m = rotation_vector_to_dcm(scale(dt, omega_bn_b))
+    p = congruence(m, covariance)
+    q = process_noise * dt
+    return multiply(m, sun_b), (p[0] + q, p[1], p[2], p[3] + q, p[4], p[5] + q)
+
+
+@kernel
+def update_cell(
+    sun_b: Vec3, covariance: Symmetric, normal_b: Vec3, output: float, cell_variance: float
+) -> tuple[Vec3, Symmetric, float]:
+    """State and covariance after one cell, and its normalised innovation squared (Eqs. 9-14).
+
+    Joseph form, P = A P A^T + R k k^T with A = I - k n^T: positive whatever rounding does to the gain.
+    """
+    g = product(covariance, normal_b)
+    s = dot(normal_b, g) + cell_variance
+    k = scale(1.0 / s, g)
+    innovation = output - dot(normal_b, sun_b)
+    a = (
+        (1.0 - k[0] * normal_b[0], -k[0] * normal_b[1], -k[0] * normal_b[2]),
+        (-k[1] * normal_b[0], 1.0 - k[1] * normal_b[1], -k[1] * normal_b[2]),
+        (-k[2] * normal_b[0], -k[2] * normal_b[1], 1.0 - k[2] * normal_b[2]),
+    )
+    p = add_outer(congruence(a, covariance), cell_variance, k)
+    sun_b = (sun_b[0] + k[0] * innovation, sun_b[1] + k[1] * innovation, sun_b[2] + k[2] * innovation)
+    return sun_b, p, innovation * innovation / s
+
+
+@kernel
+def constrain(sun_b: Vec3, covariance: Symmetric, largest_variance: float) -> tuple[Vec3, Symmetric]:
+    """Unit state; covariance projected on the tangent plane, e^2/2 along the Sun line, bounded."""
+    sun_b = scale(1.0 / norm(sun_b), sun_b)
+    # T P T = P - s g^T - g s^T + (s g) s s^T with T = I - s s^T, g = P s
+    g = product(covariance, sun_b)
+    sg = dot(sun_b, g)
+    h = (g[0] - 0.5 * sg * sun_b[0], g[1] - 0.5 * sg * sun_b[1], g[2] - 0.5 * sg * sun_b[2])
+    tangent = trace(covariance) - sg
+    along = 0.5 * tangent * tangent
+    p = (
+        covariance[0] - 2.0 * sun_b[0] * h[0],
+        covariance[1] - sun_b[0] * h[1] - h[0] * sun_b[1],
+        covariance[2] - sun_b[0] * h[2] - h[0] * sun_b[2],
+        covariance[3] - 2.0 * sun_b[1] * h[1],
+        covariance[4] - sun_b[1] * h[2] - h[1] * sun_b[2],
+        covariance[5] - 2.0 * sun_b[2] * h[2],
+    )
+    p = add_outer(p, along, sun_b)
+    diagonal = max(p[0], max(p[3], p[5]))
+    if diagonal > largest_variance:
+        # shrunk as a whole: clipping the diagonal alone can leave no covariance at all
+        p = scaled(p, largest_variance / diagonal)
+    return sun_b, p

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Symmetric 3 x 3 matrices as the six numbers of their upper triangle: xx, xy, xz, yy, yz, zz.
+
+What is stored once cannot become unsymmetric by rounding.
+"""
+
+from css_common.kernel import kernel
+from css_common.vectors import Mat3, Vec3, dot
+
+Symmetric = tuple[float, float, float, float, float, float]
+
+
+@kernel
+def isotropic(variance: float) -> Symmetric:
+    """`variance` times the identity."""
+    return (variance, 0.0, 0.0, variance, 0.0, variance)
+
+
+@kernel
+def trace(p: Symmetric) -> float:
+    """Sum of the diagonal."""
+    return p[0] + p[3] + p[5]
+
+
+@kernel
+def product(p: Symmetric, v: Vec3) -> Vec3:
+    """P v."""
+    return (
+        p[0] * v[0] + p[1] * v[1] + p[2] * v[2],
+        p[1] * v[0] + p[3] * v[1] + p[4] * v[2],
+        p[2] * v[0] + p[4] * v[1] + p[5] * v[2],
+    )
+
+
+@kernel
+def add_outer(p: Symmetric, k: float, v: Vec3) -> Symmetric:
+    """P + k v v^T."""
+    return (
+        p[0] + k * v[0] * v[0],
+        p[1] + k * v[0] * v[1],
+        p[2] + k * v[0] * v[2],
+        p[3] + k * v[1] * v[1],
+        p[4] + k * v[1] * v[2],
+        p[5] + k * v[2] * v[2],
+    )
+
+
+@kernel
+def scaled(p: Symmetric, k: float) -> Symmetric:
+    """k P."""
+    return (k * p[0], k * p[1], k * p[2], k * p[3], k * p[4], k * p[5])
+
+
+@kernel
+def congruence(m: Mat3, p: Symmetric) -> Symmetric:
+    """M P M^T."""
+    a = product(p, m[0])
+    b = product(p, m[1])
+    return (
+        dot(m[0], a),
+        dot(m[1], a),
+        dot(m[2], a),
+        dot(m[1], b),
+        dot(m[2], b),
+        dot(m[2], product(p, m[2])),
+    )
+
+
+@kernel
+def row_major(p: Symmetric) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """All nine elements, row by row."""
+    return (p[0], p[1], p[2], p[1], p[3], p[4], p[2], p[4], p[5])
