@@ -1,0 +1,249 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rotation of a rigid body with reaction wheels (Schaub & Junkins, section 4.5; O'Keefe & Schaub 2013).
+
+Equations of motion, with g_i the spin axis of wheel i and h_i = J_i (W_i + g_i.w) its momentum along it:
+
+    [I] w' = -w x ([I] w + sum h_i g_i) - sum u_i g_i + L
+    h_i'   = u_i
+    s'     = 1/4 [(1 - s.s) I + 2 [s x] + 2 s s^T] w
+
+W_i is the wheel speed relative to the body, u_i the motor torque on the wheel, L the external torque. [I]
+holds the body and the wheels, but not J_i along the spin axes, which is inside h_i.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from css_common.attitude import mrp_rate, mrp_shadow
+from css_common.kernel import kernel
+from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, row, scale, subtract
+
+_RADIANS_PER_RPM = 2.0 * math.pi / 60.0
+# Passes of the speed limit: each shrinks the excess by the ratio of wheel to body inertia.
+_LIMIT_PASSES = 4
+
+
+class RigidBody(NamedTuple):
+    """Mass properties and wheels."""
+
+    inertia: Mat3  # [kg m2] in b, without the wheels' inertia along their spin axes
+    inertia_inverse: Mat3  # [1/(kg m2)]
+    wheel_axes_b: NDArray[np.float64]  # (N, 3) unit spin axes
+    wheel_inertia: NDArray[np.float64]  # (N,) [kg m2] about the spin axis
+    wheel_max_torque: NDArray[np.float64]  # (N,) [N m]
+    wheel_max_speed: NDArray[np.float64]  # (N,) [rad/s] relative to the body
+    substeps: int  # integration steps per call
+
+
+class RotationState(NamedTuple):
+    """Attitude and rate of the body; the wheel momenta (N,) are an array beside it."""
+
+    sigma_bn: Vec3
+    omega_bn_b: Vec3  # [rad/s]
+
+
+def rigid_body(
+    inertia: ArrayLike,
+    wheel_axes: ArrayLike = (),
+    wheel_inertia: ArrayLike = 0.001,
+    wheel_max_torque: ArrayLike = 0.030,
+    wheel_max_speed_rpm: ArrayLike = 6000.0,
+    substeps: int = 1,
+) -> RigidBody:
+    """Build the parameters of `propagate`.
+
+    Args:
+        inertia: nine elements, row-major [kg m2].
+        wheel_axes: spin axes one after the other, any length [-]; empty for no wheels.
+        wheel_inertia: about the spin axis, one value or one per wheel [kg m2].
+        wheel_max_torque: one value or one per wheel [N m].
+        wheel_max_speed_rpm: one value or one per wheel [rev/min].
+        substeps: integration steps per call of `propagate`.
+    """
+    matrix = np.asarray(inertia, dtype=np.float64).reshape(3, 3)
+    axes = np.asarray(wheel_axes, dtype=np.float64).reshape(-1, 3)
+    axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    return RigidBody(
+        inertia=_rows(matrix),
+        inertia_inverse=_rows(np.linalg.inv(matrix)),
+        wheel_axes_b=np.ascontiguousarray(axes),
+        wheel_inertia=_per_wheel(wheel_inertia, len(axes)),
+        wheel_max_torque=_per_wheel(wheel_max_torque, len(axes)),
+        wheel_max_speed=_per_wheel(wheel_max_speed_rpm, len(axes)) * _RADIANS_PER_RPM,
+        substeps=int(substeps),
+    )
+
+
+def _rows(matrix: NDArray[np.float64]) -> Mat3:
+    a, b, c = (tuple(float(x) for x in r) for r in matrix)
+    return (a, b, c)
+
+
+def _per_wheel(value: ArrayLike, count: int) -> NDArray[np.float64]:
+    return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (count,)))
+
+
+@kernel
+def angular_acceleration(
+    inertia: Mat3, inertia_inverse: Mat3, omega_bn_b: Vec3, wheel_momentum_b: Vec3, torque_b: Vec3
+) -> Vec3:
+    """Body rate derivative [rad/s2]; `torque_b` [N m] is the external torque less the motor torques."""
+    momentum_b = add(multiply(inertia, omega_bn_b), wheel_momentum_b)
+    return multiply(inertia_inverse, subtract(torque_b, cross(omega_bn_b, momentum_b)))
+
+
+@kernel
+def _runge_kutta(inertia, inverse, sigma, omega, h0_b, motor_b, torque_b, dt):
+    """One RK4 step; the sum of wheel momenta grows linearly from `h0_b` because the motor torque is held."""
+    half = 0.5 * dt
+    h_half = add(h0_b, scale(half, motor_b))
+    h_full = add(h0_b, scale(dt, motor_b))
+
+    a1 = angular_acceleration(inertia, inverse, omega, h0_b, torque_b)
+    s1 = mrp_rate(sigma, omega)
+
+    w2 = add(omega, scale(half, a1))
+    a2 = angular_acceleration(inertia, inverse, w2, h_half, torque_b)
+    s2 = mrp_rate(add(sigma, scale(half, s1)), w2)
+
+    w3 = add(omega, scale(half, a2))
+    a3 = angular_acceleration(inertia, inverse, w3, h_half, torque_b)
+    s3 = mrp_rate(add(sigma, scale(half, s2)), w3)
+
+    w4 = add(omega, scale(dt, a3))
+    a4 = angular_acceleration(inertia, inverse, w4, h_full, torque_b)
+    s4 = mrp_rate(add(sigma, scale(dt, s3)), w4)
+
+    k = dt / 6.0
+    omega = (
+        omega[0] + k * (a1[0] + 2.0 * (a2[0] + a3[0]) + a4[0]),
+        omega[1] + k * (a1[1] + 2.0 * (a2[1] + a3[1]) + a4[1]),
+        omega[2] + k * (a1[2] + 2.0 * (a2[2] + a3[2]) + a4[2]),
+    )
+    sigma = (
+        sigma[0] + k * (s1[0] + 2.0 * (s2[0] + s3[0]) + s4[0]),
+        sigma[1] + k * (s1[1] + 2.0 * (s2[1] + s3[1]) + s4[1]),
+        sigma[2] + k * (s1[2] + 2.0 * (s2[2] + s3[2]) + s4[2]),
+    )
+    return mrp_shadow(sigma), omega
+
+
+@kernel
+def sum_along_axes(axes_b, components) -> Vec3:
+    """Vector sum in b of (N,) components along (N, 3) axes: wheel momenta, wheel torques, rod dipoles."""
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(components.shape[0]):
+        x += components[i] * axes_b[i, 0]
+        y += components[i] * axes_b[i, 1]
+        z += components[i] * axes_b[i, 2]
+    return (x, y, z)
+
+
+@kernel
+def wheel_speed(p: RigidBody, omega_bn_b: Vec3, momentum: float, i: int) -> float:
+    """Speed of wheel i relative to the body [rad/s]."""
+    return momentum / p.wheel_inertia[i] - dot(row(p.wheel_axes_b, i), omega_bn_b)
+
+
+@kernel
+def wheel_momentum_at_speed(p: RigidBody, omega_bn_b: Vec3, speed: float, i: int) -> float:
+    """Momentum of wheel i [N m s] that turns at `speed` [rad/s] relative to the body."""
+    return p.wheel_inertia[i] * (speed + dot(row(p.wheel_axes_b, i), omega_bn_b))
+
+
+@kernel
+def _integrate(p, state, h_b, motor_b, external_torque_b, dt):
+    torque_b = subtract(external_torque_b, motor_b)
+    sigma, omega = state.sigma_bn, state.omega_bn_b
+    step = dt / p.substeps
+    for _ in range(p.substeps):
+        sigma, omega = _runge_kutta(p.inertia, p.inertia_inverse, sigma, omega, h_b, motor_b, torque_b, step)
+        h_b = add(h_b, scale(step, motor_b))
+    return RotationState(sigma, omega)
+
+
+@kernel
+def _limit_torques(max_torque, command, torque_out) -> int:
+    """Commands cut to the wheels' torque limits; mask of those cut."""
+    mask = 0
+    for i in range(command.shape[0]):
+        limit = max_torque[i]
+        torque = command[i]
+        if not abs(torque) <= limit:  # also catches a command that is not a number: no torque
+            torque = limit if torque > limit else (-limit if torque < -limit else 0.0)
+            mask |= 1 << i
+        torque_out[i] = torque
+    return mask
+
+
+@kernel
+def _near_speed_limit(p, omega, wheel_momentum, torque, dt) -> bool:
+    """True when some wheel may pass its limit; cheap, because it bounds g.w instead of computing it."""
+    body = abs(omega[0]) + abs(omega[1]) + abs(omega[2])
+    for i in range(torque.shape[0]):
+        if abs(wheel_momentum[i] + dt * torque[i]) > p.wheel_inertia[i] * (p.wheel_max_speed[i] - body):
+            return True
+    return False
+
+
+@kernel
+def _cut_at_speed_limit(p, omega, wheel_momentum, torque, dt) -> int:
+    """Cut the torque of wheels that pass their speed limit at the end of the step; mask of those wheels."""
+    mask = 0
+    for i in range(torque.shape[0]):
+        limit = p.wheel_max_speed[i]
+        speed = wheel_speed(p, omega, wheel_momentum[i] + dt * torque[i], i)
+        excess = speed - min(max(speed, -limit), limit)
+        # a tolerance of rounding only: a wheel held at its limit must not be cut again and again
+        if abs(excess) > 1e-12 * limit:
+            axis = row(p.wheel_axes_b, i)
+            gain = dt * (1.0 / p.wheel_inertia[i] + dot(axis, multiply(p.inertia_inverse, axis)))
+            cut = torque[i] - excess / gain
+            torque[i] = min(max(cut, -p.wheel_max_torque[i]), p.wheel_max_torque[i])
+            mask |= 1 << i
+    return mask
+
+
+@kernel
+def propagate(
+    p: RigidBody,
+    state: RotationState,
+    wheel_momentum,
+    wheel_command,
+    external_torque_b: Vec3,
+    dt: float,
+    wheel_torque_out,
+):
+    """Advance attitude, rate and wheel momenta by `dt` [s] under constant motor and external torques.
+
+    A command beyond a wheel's torque limit is cut to it. A torque that would carry a wheel past its speed
+    limit by the end of the step is cut so that the wheel ends there, as far as the torque limit allows.
+
+    Args:
+        wheel_momentum: (N,) [N m s], advanced in place.
+        wheel_command: (N,) motor torques asked for [N m].
+        external_torque_b: [N m].
+        wheel_torque_out: (N,) motor torques applied [N m], written.
+
+    Returns:
+        Rotation state (|sigma_bn| <= 1), mask of torque-limited wheels, mask of speed-limited wheels.
+    """
+    torque_limited = _limit_torques(p.wheel_max_torque, wheel_command, wheel_torque_out)
+    h_b = sum_along_axes(p.wheel_axes_b, wheel_momentum)
+    motor_b = sum_along_axes(p.wheel_axes_b, wheel_torque_out)
+    end = _integrate(p, state, h_b, motor_b, external_torque_b, dt)
+    speed_limited = 0
+    if _near_speed_limit(p, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt):
+        for _ in range(_LIMIT_PASSES):
+            cut = _cut_at_speed_limit(p, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt)
+            if cut == 0:
+                break
+            speed_limited |= cut
+            motor_b = sum_along_axes(p.wheel_axes_b, wheel_torque_out)
+            end = _integrate(p, state, h_b, motor_b, external_torque_b, dt)
+    for i in range(wheel_momentum.shape[0]):
+        wheel_momentum[i] += dt * wheel_torque_out[i]
+    return end, torque_limited, speed_limited
