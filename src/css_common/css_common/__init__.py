@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Attitude maths, random streams, compiled-kernel decorator, mission schema and the node base shared by every Sunpoint package."""
+"""What every Sunpoint package builds on: attitude maths, random streams, missions, components and their host."""

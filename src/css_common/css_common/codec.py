@@ -80,7 +80,8 @@ class Codec:
         names = list(message_type.get_fields_and_field_types())
         if not names or message_type.get_fields_and_field_types()[names[0]] != "std_msgs/Header":
             raise TypeError(f"{self.type_name} does not begin with a std_msgs/Header")
-        self.fields = [self._field(name, slot) for name, slot in zip(names[1:], message_type.SLOT_TYPES[1:], strict=True)]
+        slots = message_type.SLOT_TYPES[1:]
+        self.fields = [self._field(name, slot) for name, slot in zip(names[1:], slots, strict=True)]
 
     def _field(self, name: str, slot: Any) -> _Field:
         kind = type(slot).__name__

@@ -157,6 +157,10 @@ class Matcher:
                 ready.append(self._complete(stamp))
         return ready
 
+    def oldest_pending(self) -> int | None:
+        """Stamp of the oldest incomplete cycle."""
+        return min(self._pending, default=None)
+
     def missing(self) -> list[str]:
         """Topics that the oldest incomplete cycle still waits for."""
         if not self._pending:

@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The executor of every Sunpoint process.
+
+rclpy's EventsExecutor is several times faster than SingleThreadedExecutor but experimental, and its `spin()` runs no
+callback in Jazzy while `spin_once()` works: it is used through `spin_until` alone. `DrainingExecutor` is the fallback
+(environment variable SUNPOINT_EXECUTOR=draining): a SingleThreadedExecutor that empties each ready queue before it
+builds its wait set anew, which is what costs rclpy most of its time.
+"""
+
+import os
+from collections.abc import Callable, Iterable
+
+from rclpy.context import Context
+from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
+from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
+from rclpy.utilities import get_default_context
+
+
+class DrainingExecutor(SingleThreadedExecutor):
+    """Takes messages until every subscription is empty, then waits for whatever comes first."""
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Delivers all waiting messages; only when there are none, waits and runs one other callback."""
+        if self._drain():
+            timeout_sec = 0.0
+        super().spin_once(timeout_sec)
+
+    def _drain(self) -> bool:
+        found = taken = True
+        taken_any = False
+        while found:
+            found = False
+            for node in self.get_nodes():
+                for subscription in node.subscriptions:
+                    with subscription.handle:
+                        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                    if taken is not None:
+                        subscription.callback(taken[0])
+                        found = taken_any = True
+        return taken_any
+
+
+def create_executor(kind: str | None = None, context: Context | None = None) -> Executor:
+    """An executor.
+
+    Args:
+        kind: `events` or `draining`; None takes SUNPOINT_EXECUTOR, or `events`.
+        context: ROS context; None is the default one.
+
+    Raises:
+        ValueError: another word.
+    """
+    kind = kind or os.environ.get("SUNPOINT_EXECUTOR") or "events"
+    if kind == "events":
+        return EventsExecutor(context=context)
+    if kind == "draining":
+        return DrainingExecutor(context=context)
+    raise ValueError(f"SUNPOINT_EXECUTOR: {kind!r} given, expected events or draining")
+
+
+def spin_until(
+    executor: Executor, done: Callable[[], bool], interval: float = 0.05, context: Context | None = None
+) -> None:
+    """Runs callbacks until `done()`, which is asked after each callback and at least every `interval` seconds.
+
+    Raises:
+        ExternalShutdownException: the ROS context was shut down from elsewhere.
+    """
+    context = context or get_default_context()
+    while not done():
+        if not context.ok():
+            raise ExternalShutdownException
+        executor.spin_once(timeout_sec=interval)
+
+
+def add_nodes(executor: Executor, nodes: Iterable[Node]) -> None:
+    """Adds nodes to an executor."""
+    for node in nodes:
+        executor.add_node(node)

@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The lifecycle node around a component: everything that all nodes of the graph have in common.
+
+Parameters, topics, checks at the edge, stamp matching, scripted events, diagnostics. What a node computes is in its
+component; what only the node that owns simulated time does is in `css_common.plant_host`.
+"""
+
+import traceback
+from collections import Counter
+from functools import partial
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from css_common import ros_parameters, sections
+from css_common.codec import Sample, codec_of
+from css_common.component import Component, Outgoing, Output
+from css_common.edge import Edge, Matcher
+from css_common.mission import Event, Mission
+from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
+from css_common.schema import ParameterError, shaped_values
+
+_SUCCESS = TransitionCallbackReturn.SUCCESS
+_FAILURE = TransitionCallbackReturn.FAILURE
+
+
+class ComponentNode(LifecycleNode):
+    """Hosts one component."""
+
+    def __init__(
+        self,
+        component_type: type[Component],
+        name: str,
+        mission: Mission,
+        *,
+        context: Context | None = None,
+        use_global_arguments: bool = True,
+    ) -> None:
+        """Declares the parameters; topics come with the configure transition.
+
+        Args:
+            component_type: what to host.
+            name: node name; a command-line remapping wins.
+            mission: where parameter values, events and the rest of the graph come from.
+            context: ROS context.
+            use_global_arguments: False in a composed process, where one command line serves many nodes.
+
+        Raises:
+            ParameterError: an override that its specification refuses.
+        """
+        super().__init__(name, context=context, use_global_arguments=use_global_arguments)
+        self.mission = mission
+        self.component_type = component_type
+        self.component: Component | None = None
+        self.counters: Counter[str] = Counter()
+        self.edges: dict[str, Edge] = {}
+        self.matcher: Matcher | None = None
+        self._table = component_type.table()
+        self._canonical = self._declare()
+        self._output_ports: dict[str, tuple] = {}
+        self._subscriptions_made: list = []
+        self._events: list[Event] = []
+        self._is_active = False
+        self._seen_errors: set[str] = set()
+        self._last_stamp = 0
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self._watch_timer = self.create_timer(1.0, self._publish_diagnostics, clock=self._steady)
+        self._deadline_timer = None
+        self._overdue_stamp: int | None = None
+        self._guard_lifecycle_service()
+        ros_parameters.guard(self, self._table, self._canonical, self._tune, self._conflict)
+
+    # Start and transitions
+
+    def start(self) -> bool:
+        """Configures and activates when the node is to start by itself; False when that failed."""
+        if not self._canonical["autostart"]:
+            return True
+        return self.trigger_configure() == _SUCCESS and self.trigger_activate() == _SUCCESS
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Builds the component and its topics. On a conflict between parameters the node stays unconfigured."""
+        return self._guarded(self._configure)
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begins to cycle, from a fresh state when the node was deactivated before."""
+        return self._guarded(self._activate)
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Stops cycling; what a component publishes while idle goes on."""
+        return self._guarded(self._deactivate)
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Gives topics and state up."""
+        return self._guarded(self._clean_up)
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Gives topics and state up, whatever the state."""
+        return self._guarded(self._clean_up)
+
+    def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Goes back to unconfigured after a transition that failed."""
+        return self._guarded(self._clean_up)
+
+    def _guarded(self, transition) -> TransitionCallbackReturn:
+        # rclpy turns an exception in a transition into a silent ERROR
+        try:
+            transition()
+        except ParameterError as error:
+            self.get_logger().error(str(error))
+            return _FAILURE
+        except Exception:
+            self.get_logger().error(f"{transition.__name__.lstrip('_')} failed:\n{traceback.format_exc()}")
+            return TransitionCallbackReturn.ERROR
+        return _SUCCESS
+
+    def _guard_lifecycle_service(self) -> None:
+        # An invalid transition request raises out of spin in rclpy 7.1 and would end the process.
+        service = self._service_change_state
+        inner = service.callback
+
+        def answer(request, response):
+            try:
+                return inner(request, response)
+            except Exception as error:
+                self.get_logger().warning(f"lifecycle request refused: {error}")
+                self.counters["lifecycle_refused"] += 1
+                response.success = False
+                return response
+
+        service.callback = answer
+
+    def _declare(self) -> dict:
+        node = self.mission.node_of(self.component_type, self.get_name())
+        return ros_parameters.declare(self, self._table, node.canonical)
+
+    def _configure(self) -> None:
+        reason = self._conflict(self._canonical)
+        if reason:
+            raise ParameterError(reason)
+        name = self.get_name()
+        self.component = self.component_type(name, shaped_values(self._table, self._canonical))
+        values = self.component.values
+        inputs = self.component_type.inputs(name, values)
+        published = self.mission.topics
+        awaited = [i.key for i in inputs if i.required or i.topic in published]
+        self.matcher = Matcher(self.component, inputs, awaited)
+        self._events = [e for e in self.mission.events if e.node == name]
+        for output in self.component_type.outputs(name, values):
+            self._output_ports[output.key] = self._create_output(output)
+        for source in inputs:
+            edge = Edge(source, values, self.get_logger().warning)
+            self.edges[source.key] = edge
+            self._subscribe(source.message_type, source.topic, partial(self._receive, source.key, edge))
+        if self.mission.values.lockstep.realtime_factor > 0.0 and any(not i.required for i in inputs):
+            self._deadline_timer = self.create_timer(values.io.deadline, self._run_overdue, clock=self._steady)
+
+    def _create_output(self, output: Output) -> tuple:
+        publisher = self.create_publisher(
+            output.message_type,
+            output.topic,
+            LOOP_PUBLISHER,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        codec = codec_of(output.message_type)
+        return publisher, codec, codec.real_fields(), output.topic
+
+    def _subscribe(self, message_type: type, topic: str, callback) -> None:
+        self._subscriptions_made.append(
+            self.create_subscription(
+                message_type,
+                topic,
+                callback,
+                LOOP_SUBSCRIPTION,
+                raw=True,
+                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            )
+        )
+
+    def _activate(self) -> None:
+        if self.counters["deactivated"] > self.counters["reactivated"]:
+            self.counters["reactivated"] += 1
+            self.component.configure()
+        self._is_active = True
+
+    def _deactivate(self) -> None:
+        self._is_active = False
+        self.counters["deactivated"] += 1
+
+    def _clean_up(self) -> None:
+        self._is_active = False
+        for subscription in self._subscriptions_made:
+            self.destroy_subscription(subscription)
+        for publisher, *_ in self._output_ports.values():
+            self.destroy_publisher(publisher)
+        if self._deadline_timer is not None:
+            self.destroy_timer(self._deadline_timer)
+            self._deadline_timer = None
+        self._subscriptions_made.clear()
+        self._output_ports.clear()
+        self.edges.clear()
+        self.component = self.matcher = None
+
+    def finish(self, seconds: float = 2.0) -> None:
+        """Waits until listeners have what was published, so that a message is not lost with its sender."""
+        timeout = Duration(seconds=seconds)
+        for publisher, *_ in self._output_ports.values():
+            publisher.wait_for_all_acked(timeout)
+
+    # Messages
+
+    def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        sample = edge.accept(data)
+        if sample is not None:
+            for stamp_ns, received in self.matcher.offer(key, sample):
+                self._run(stamp_ns, received)
+
+    def _run_overdue(self) -> None:
+        # Two firings apart: what was pending at the last one and still is has waited a whole deadline.
+        waiting = self.matcher.oldest_pending()
+        if waiting is not None and waiting == self._overdue_stamp:
+            for stamp_ns, received in self.matcher.overdue():
+                self.counters["deadline_missed"] += 1
+                self._run(stamp_ns, received)
+        self._overdue_stamp = waiting
+
+    def _run(self, stamp_ns: int, received: dict[str, Sample | None]) -> None:
+        if self._events:
+            self._apply_events(stamp_ns)
+        self._last_stamp = stamp_ns
+        component = self.component
+        try:
+            outgoing = (component.cycle if self._is_active else component.idle)(stamp_ns, received)
+        except Exception as error:
+            self._report_failure(error)
+            return
+        self.counters["cycles"] += 1
+        self._publish(outgoing)
+
+    def _publish(self, outgoing: Outgoing) -> None:
+        for key, sample in outgoing.items():
+            publisher, codec, real_fields, topic = self._output_ports[key]
+            bad = codec.first_not_finite(real_fields, sample)
+            if bad is not None:
+                self.counters["withheld_not_finite"] += 1
+                self._report_once(f"{topic}: {bad} is not finite, message withheld")
+                continue
+            publisher.publish(codec.encode(sample))
+
+    def _report_failure(self, error: Exception) -> None:
+        self.counters["cycle_failed"] += 1
+        trace = "".join(traceback.format_exception(error))
+        self._report_once(f"cycle failed, no output for this stamp:\n{trace}")
+
+    def _report_once(self, text: str) -> None:
+        if text not in self._seen_errors:
+            self._seen_errors.add(text)
+            self.get_logger().error(text + " (further ones are counted, not reported)")
+
+    def _apply_events(self, stamp_ns: int) -> None:
+        elapsed = (stamp_ns - self.mission.epoch_ns) / 1e9
+        while self._events and elapsed >= self._events[0].time - 1e-9:
+            event = self._events.pop(0)
+            self.get_logger().info(f"event {event.name} at {event.time:g} s: {event.action} {event.parameter}".rstrip())
+            if event.action == "set":
+                self.set_parameters([RosParameter(event.parameter, value=event.value)])
+            elif event.action == "deactivate" and self._is_active:
+                self.trigger_deactivate()
+            elif event.action == "activate" and not self._is_active:
+                self.trigger_activate()
+
+    # Parameters
+
+    def _conflict(self, canonical: dict) -> str | None:
+        values = shaped_values(self._table, canonical)
+        for reason in (*sections.conflicts(values), *self.component_type.conflicts(values)):
+            return reason
+        return None
+
+    def _tune(self, canonical: dict) -> None:
+        if self.component is not None:
+            self.component.tune(shaped_values(self._table, canonical))
+
+    # Health
+
+    def health(self) -> tuple[bytes, str, dict[str, int]]:
+        """Level, one line and counters for /diagnostics."""
+        counters = dict(self.counters)
+        for key, edge in self.edges.items():
+            counters[f"{key}.accepted"] = edge.accepted
+            for kind, count in edge.rejected.items():
+                counters[f"{key}.rejected.{kind}"] = count
+        if self.matcher is not None:
+            counters["unmatched"] = self.matcher.unmatched
+        if self.counters["cycle_failed"] or self.counters["withheld_not_finite"]:
+            return DiagnosticStatus.ERROR, "cycles failed", counters
+        if any(edge.rejected for edge in self.edges.values()):
+            return DiagnosticStatus.WARN, "messages rejected", counters
+        return DiagnosticStatus.OK, "active" if self._is_active else "inactive", counters
+
+    def _publish_diagnostics(self) -> None:
+        level, message, counters = self.health()
+        array = DiagnosticArray()
+        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self._last_stamp, 1_000_000_000)
+        array.status = [
+            DiagnosticStatus(
+                level=level,
+                name=self.get_fully_qualified_name(),
+                message=message,
+                hardware_id="",
+                values=[KeyValue(key=key, value=str(value)) for key, value in counters.items()],
+            )
+        ]
+        self._diagnostics.publish(array)

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The node that owns simulated time: it starts the loop, waits for its partners and paces it.
+
+Lockstep is event driven: the plant leaves stamp k when every awaited topic has a message stamped k. Timers only watch
+(a partner that is silent is named, and after a limit the flight goes on without it) or, in real time, hold back.
+"""
+
+import time
+from functools import partial
+
+from css_common.codec import Sample, stamp_of
+from css_common.component import Outgoing, Plant
+from css_common.edge import Edge, StampGuard
+from css_common.host import ComponentNode
+
+
+class PlantNode(ComponentNode):
+    """Hosts a `Plant`."""
+
+    component: Plant | None
+
+    def __init__(self, *args, **kwargs) -> None:
+        super().__init__(*args, **kwargs)
+        self.done = False
+        self.failed = ""
+        self._stamp = 0
+        self._answers: dict[str, Sample | None] = {}
+        self._awaited: dict[str, str] = {}
+        self._lost: set[str] = set()
+        self._held_back: Outgoing | None = None
+        self._begun = False
+        self._waiting_since = time.monotonic()
+        self._warned: set[str] = set()
+        self._startup_timer = None
+        self._pace_timer = None
+        self._watch = None
+
+    @property
+    def stamp_ns(self) -> int:
+        """Simulated time now."""
+        return self._stamp
+
+    @property
+    def begun(self) -> bool:
+        """True once all partners were there and the first messages are out."""
+        return self._begun
+
+    def _configure(self) -> None:
+        super()._configure()
+        lockstep = self.component.values.lockstep
+        consumed = {i.topic: i.key for i in self.component.inputs(self.get_name(), self.component.values)}
+        awaited = self.mission.awaited
+        # key of an answer: the component's own name for what it consumes, the topic for what is only awaited
+        self._awaited = {consumed.get(topic, topic): topic for topic in awaited}
+        for topic in awaited:
+            if topic not in consumed:
+                guard = StampGuard(2**62)
+                self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic, guard))
+        self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)
+        if lockstep.realtime_factor > 0.0 or not self._awaited:
+            # a plant that nobody answers needs a timer in any case: it would never return to its executor
+            factor = lockstep.realtime_factor or 1e9
+            period = max(self.component.period_ns * 1e-9 / factor, 1e-4)
+            self._pace_timer = self.create_timer(period, self._on_pace, clock=self._steady)
+
+    def _activate(self) -> None:
+        super()._activate()
+        self._waiting_since = time.monotonic()
+        if not self._begun:
+            self._startup_timer = self.create_timer(0.01, self._try_to_begin, clock=self._steady)
+
+    def _clean_up(self) -> None:
+        for timer in (self._startup_timer, self._pace_timer, self._watch):
+            if timer is not None:
+                self.destroy_timer(timer)
+        self._startup_timer = self._pace_timer = self._watch = None
+        super()._clean_up()
+
+    # Start
+
+    def _try_to_begin(self) -> None:
+        absent = self._absent_partners()
+        lockstep = self.component.values.lockstep
+        waited, limit = time.monotonic() - self._waiting_since, lockstep.startup_limit
+        if absent and waited < limit:
+            if waited > lockstep.warn_after and not self._warned.issuperset(absent):
+                self._warned.update(absent)
+                self.get_logger().warning(f"the flight has not begun: {'; '.join(absent)}")
+            return
+        self.destroy_timer(self._startup_timer)
+        self._startup_timer = None
+        if absent:
+            self.failed = f"after {limit:g} s still absent: {'; '.join(absent)}"
+            self.get_logger().error(self.failed)
+            self.done = True
+            return
+        outgoing = self.component.begin()
+        self._begun = True
+        self._warned.clear()
+        self._go_to(self.mission.epoch_ns, outgoing)
+
+    def _absent_partners(self) -> list[str]:
+        absent = []
+        for *_, topic in self._output_ports.values():
+            if self.count_publishers(topic) > 1:
+                absent.append(f"{topic} has a second publisher; another flight in this ROS_DOMAIN_ID must end first")
+        recorders = self.component.values.lockstep.recorders
+        for publisher, *_, topic in self._output_ports.values():
+            expected = recorders + sum(
+                any(i.topic == topic for i in node.inputs)
+                for node in self.mission.nodes
+                if node.component is not self.component_type
+            )
+            found = publisher.get_subscription_count()
+            if found < expected:
+                absent.append(f"{topic} has {found} of {expected} listeners")
+        for topic in self._awaited.values():
+            if self.count_publishers(topic) == 0:
+                absent.append(f"{topic} has no publisher")
+        return absent
+
+    # The loop
+
+    def _go_to(self, stamp_ns: int, outgoing: Outgoing) -> None:
+        self._stamp = self._last_stamp = stamp_ns
+        self._answers.clear()
+        self._waiting_since = time.monotonic()
+        self.counters["cycles"] += 1
+        if self._events:
+            self._apply_events(stamp_ns)
+        self._publish(outgoing)
+        if not self._awaited:
+            self._advance()
+
+    def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        if edge.source.topic in self._lost:
+            # it is back: whatever it says next counts, and the loop waits for it again
+            edge.guard.last = None
+        sample = edge.accept(data)
+        if sample is not None:
+            self._take(key, edge.source.topic, sample.stamp_ns, sample)
+
+    def _note(self, topic: str, guard: StampGuard, data: bytes) -> None:
+        stamp_ns = stamp_of(data)
+        if guard.refusal(stamp_ns) is None:
+            self._take(topic, topic, stamp_ns, None)
+
+    def _take(self, key: str, topic: str, stamp_ns: int, sample: Sample | None) -> None:
+        if stamp_ns != self._stamp:
+            self.counters["answers_for_another_stamp"] += 1
+            return
+        if topic in self._lost:
+            self._lost.discard(topic)
+            self.get_logger().info(f"{topic} is back")
+        self._answers[key] = sample
+        if self._is_active and self._held_back is None and all(k in self._answers for k in self._needed()):
+            self._advance()
+
+    def _needed(self) -> list[str]:
+        outputs = self.mission.outputs
+        step = self.component.step_of(self._stamp)
+        return [
+            key
+            for key, topic in self._awaited.items()
+            if topic not in self._lost and step % outputs[topic].divider == 0
+        ]
+
+    def _advance(self) -> None:
+        stamp_ns = self._stamp
+        keys = self.matcher.inputs
+        try:
+            outgoing = self.component.cycle(stamp_ns, {key: self._answers.get(key) for key in keys})
+        except Exception as error:
+            self._report_failure(error)
+            self.failed = f"the plant failed at stamp {stamp_ns}: {error}"
+            self.done = True
+            return
+        if self.component.finished:
+            self.done = True
+        elif self._pace_timer is None:
+            self._go_to(stamp_ns + self.component.period_ns, outgoing)
+        else:
+            self._held_back = outgoing
+
+    def _on_pace(self) -> None:
+        if self._held_back is not None:
+            outgoing, self._held_back = self._held_back, None
+            self._go_to(self._stamp + self.component.period_ns, outgoing)
+        elif self._begun and not self.done:
+            self.counters["deadline_missed"] += 1
+
+    # Partners that fall silent
+
+    def _watch_partners(self) -> None:
+        if not self._begun or self.done or not self._is_active or self._held_back is not None:
+            return
+        silent_for = time.monotonic() - self._waiting_since
+        lockstep = self.component.values.lockstep
+        missing = [self._awaited[key] for key in self._needed() if key not in self._answers]
+        if silent_for < lockstep.warn_after or not missing:
+            return
+        if silent_for >= lockstep.hold_limit:
+            self.get_logger().error(
+                f"no {', '.join(missing)} for {silent_for:.1f} s: going on without, actuators at rest until it is back"
+            )
+            self._lost.update(missing)
+            self.counters["partners_lost"] += len(missing)
+            self._warned.clear()
+            self._advance()
+        elif not self._warned.issuperset(missing):
+            self._warned.update(missing)
+            self.get_logger().warning(
+                f"simulated time holds at {(self._stamp - self.mission.epoch_ns) / 1e9:.1f} s: "
+                f"waiting for {', '.join(missing)}"
+            )
