@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The folder of a recording on disk: making it, replacing it, and writing into it so that it lasts."""
 
+import fcntl
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
@@ -29,11 +31,26 @@ def prepare_folder(folder: Path, overwrite: bool) -> None:
 
 
 def create_file(path: Path) -> IO[bytes]:
-    """Open a new file for writing; one that exists, perhaps another recorder's, is refused."""
+    """Open a new file for writing, locked; one that exists, perhaps another recorder's, is refused."""
     try:
-        return path.open("xb")
+        file = path.open("xb")
     except OSError as error:
         raise BagError(f"{path}: cannot create the recording: {error.strerror}") from error
+    with suppress(OSError):  # not every file system knows locks
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return file
+
+
+def is_being_written(path: Path) -> bool:
+    """Whether a recorder that is alive holds the file."""
+    with path.open("rb") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except BlockingIOError:
+            return True
+        except OSError:
+            return False
+    return False
 
 
 def write_atomically(path: Path, text: str) -> None:

@@ -36,6 +36,7 @@ from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
 LIBRARY = "sunpoint css_recording"
 METADATA_RECORD = "sunpoint"
 _MAX_CHUNK_BYTES = 1 << 20
+_ROS_DISTRO = "jazzy"  # where no ROS is sourced
 
 
 class BagWriter:
@@ -43,12 +44,12 @@ class BagWriter:
 
     Parameters
     ----------
-    folder: the recording. The file in it is called `<folder name>_0.mcap`.
+    folder: the recording. The file in it is called `<folder name>_0.mcap`, as rosbag2 does.
     topics: in the order in which messages of equal stamp are stored.
     metadata: texts kept in the file's record `sunpoint` (mission, versions, ...).
     overwrite: replace a recording that is there. A folder that holds anything else is always refused.
     limits: how long messages are held to be put in order.
-    ros_distro: default: the one that is sourced, else jazzy.
+    file_name: of the file, when it is not the folder's name.
 
     Every method raises `BagError` when the disk refuses. The recording is then over, and what was written
     before can be recovered.
@@ -62,11 +63,10 @@ class BagWriter:
         *,
         overwrite: bool = False,
         limits: BufferLimits = BufferLimits(),  # noqa: B008 (immutable)
-        ros_distro: str | None = None,
+        file_name: str | None = None,
     ) -> None:
         self.folder = Path(folder).absolute()
-        self.path = self.folder / f"{self.folder.name}_0.mcap"
-        self._ros_distro = ros_distro or os.environ.get("ROS_DISTRO", "jazzy")
+        self.path = self.folder / (file_name or f"{self.folder.name}_0.mcap")
         self._topics: list[Topic] = []
         self._schemas: list[MessageSchema] = []
         self._schema_ids: dict[MessageSchema, int] = {}
@@ -185,7 +185,7 @@ class BagWriter:
             raise self._fail(error) from error
 
     def flush(self) -> None:
-        """Hand everything received so far to the operating system; more of the same seconds will be late."""
+        """Hand everything received so far to the operating system."""
         self._check_open()
         self._store(self._buffer.drain())
 
@@ -194,7 +194,8 @@ class BagWriter:
         if self._file is None:
             return
         self.flush()
-        summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, self._ros_distro)
+        distro = os.environ.get("ROS_DISTRO", _ROS_DISTRO)
+        summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         try:
             # One record only: of several, some readers take the first and others the last.

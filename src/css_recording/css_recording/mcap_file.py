@@ -55,7 +55,8 @@ class McapFile:
     """An open MCAP file.
 
     records: metadata, attachments, chunks and messages outside of chunks, in file order.
-    complete: the file is finished: it ends as the format wants it.
+    complete: the file is finished: every record is intact and it ends as the format wants it.
+    has_end: its last bytes are those of a finished file; when it is not complete, it is damaged inside.
     torn_bytes: what follows the last intact record of an unfinished file.
     """
 
@@ -66,7 +67,7 @@ class McapFile:
         self.statistics: Statistics | None = None
         self.records: list[Metadata | Attachment | Chunk | RawMessage] = []
         self.profile = ""
-        self.complete = False
+        self.complete = self.has_end = False
         self.torn_bytes = 0
         self._map: mmap.mmap | bytes = _map_file(path)
         if self._map[: len(MAGIC)] != MAGIC:
@@ -141,6 +142,7 @@ class McapFile:
             position = following
             if opcode == Opcode.FOOTER:
                 break
+        self.has_end = data[-len(MAGIC) :] == MAGIC and size > len(MAGIC)
         self.complete = opcode == Opcode.FOOTER and data[position:] == MAGIC
         self.torn_bytes = 0 if self.complete else size - position
 

@@ -58,8 +58,11 @@ class SecondBuffer:
         return None
 
     def drain(self) -> list[list[Message]]:
-        """Hand out everything held. Messages of the same seconds that come afterwards are late."""
-        batches = [self._take(second) for second in sorted(self._open)]
+        """Hand out everything held. Messages of the last second that come afterwards make another batch."""
+        seconds = sorted(self._open)
+        batches = [self._sorted(self._open.pop(second)) for second in seconds]
+        if seconds:
+            self._finished_second = max(self._finished_second, seconds[-1] - 1)
         return batches + self._take_late()
 
     def held(self) -> list[Message]:
@@ -80,14 +83,17 @@ class SecondBuffer:
             batches.append(self._sorted(self._open.pop(min(self._open))))
             if self._open:
                 self._set_due()
-        return batches
+        return batches + self._take_late()
 
     def _take(self, second: int) -> list[Message]:
         self._finished_second = max(self._finished_second, second)
         return self._sorted(self._open.pop(second))
 
     def _add_late(self, second: int, message: Message) -> list[list[Message]]:
-        """Late messages are batched by themselves, in runs that stay within one second."""
+        """Late messages are batched by themselves, in runs that stay within one second.
+
+        They wait for the next second that is over, at most.
+        """
         batches = self._take_late() if self._late and self._late[0][0] // SECOND_NS != second else []
         self.late_messages += 1
         self._late.append(message)
