@@ -10,6 +10,9 @@ from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3
 
+# Beyond it a number is no reading of a cell, and its square would overflow.
+READABLE = 1e100
+
 # A normal this close to the clipping plane lies in it: rounding must not hide half of such a cell's view.
 _IN_PLANE = 1e-9
 
@@ -53,12 +56,12 @@ def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
 
 @kernel
 def brightest(voltages) -> int:
-    """Index of the largest finite output; -1 when no output is above zero."""
+    """Index of the largest readable output; -1 when none is above zero."""
     index = -1
     largest = 0.0
     for i in range(voltages.shape[0]):
         # a NaN compares false
-        if voltages[i] > largest and voltages[i] < math.inf:
+        if voltages[i] > largest and voltages[i] < READABLE:
             largest = voltages[i]
             index = i
     return index

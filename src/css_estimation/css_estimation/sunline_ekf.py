@@ -20,14 +20,13 @@ Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 t
 measured rate, 4 propagating without one.
 """
 
-import math
 from typing import NamedTuple
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, choice, real
-from css_common.vectors import Vec3, norm
+from css_common.vectors import Vec3
 from css_estimation import sun_tracking
-from css_estimation.cell_layout import CellLayout, brightest, cell_layout, sees
+from css_estimation.cell_layout import READABLE, CellLayout, brightest, cell_layout, sees
 from css_estimation.sun_heading import NO_COVARIANCE, RATE_NONE, SunHeading
 from css_estimation.sun_tracking import (
     Estimate,
@@ -99,7 +98,6 @@ MODE_COASTING = 4
 
 # A reading above twice the normal Sun is a fault: it must not throw the state to where rounding rules.
 _LARGEST_READING = 2.0
-_NO_DIRECTION = 1e-6
 
 
 class EkfParameters(NamedTuple):
@@ -159,7 +157,7 @@ def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages,
     count = 0
     for i in range(voltages.shape[0]):
         v = voltages[i]
-        if not math.isfinite(v) or not (v > level or sees(p.cells, i, predicted_b)):
+        if not (-READABLE < v < READABLE and (v > level or sees(p.cells, i, predicted_b))):
             continue
         v = min(max(v, -_LARGEST_READING), _LARGEST_READING)
         normal_b = (n[i, 0], n[i, 1], n[i, 2])
@@ -196,7 +194,6 @@ def step(
         rate = gyro_b if gyro_ok and not p.propagate_filtered else tracking.omega_bn_b
         noise = p.process_noise if rate_known else p.process_noise_without_rate
         sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
-        sun_b, covariance = constrain(sun_b, covariance, p.largest_variance)
 
     mode = MODE_PROPAGATING if rate_known else MODE_COASTING
     restarted = False
@@ -206,17 +203,18 @@ def step(
     if lit:
         mode = MODE_TRACKING
         if not started or trace(covariance) > 3.0 * p.initial_variance:
-            average_b, _, average_mode = weighted_average(p.cells, p.gate, voltages)
+            average_b, _, average_mode = weighted_average(p.cells, p.gate, voltages, top)
             if average_mode != MODE_NO_SUN:
                 sun_b = average_b
                 covariance = isotropic(p.initial_variance)
                 mode = MODE_STARTED
                 started = restarted = True
+    predicted_b = sun_b
     if lit and started:
-        updated_b, updated, nis, count, mask = update_cells(p, sun_b, covariance, voltages, largest)
-        if norm(updated_b) > _NO_DIRECTION:
-            sun_b, covariance = constrain(updated_b, updated, p.largest_variance)
-    if not started:
+        sun_b, covariance, nis, count, mask = update_cells(p, sun_b, covariance, voltages, largest)
+    if started:
+        sun_b, covariance = constrain(sun_b, predicted_b, covariance, p.largest_variance)
+    else:
         mode = MODE_WAITING
 
     estimate = Estimate(

@@ -8,7 +8,9 @@ sequence equal the stacked one of the paper, without a matrix inverse.
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot, multiply, norm, scale
-from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, trace
+from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, subtract_pair, trace
+
+_NO_DIRECTION = 1e-6
 
 
 @kernel
@@ -28,41 +30,38 @@ def update_cell(
 ) -> tuple[Vec3, Symmetric, float]:
     """State and covariance after one cell, and its normalised innovation squared (Eqs. 9-14).
 
-    Joseph form, P = A P A^T + R k k^T with A = I - k n^T: positive whatever rounding does to the gain.
+    Joseph form, (I - k n^T) P (I - k n^T)^T + R k k^T, multiplied out to P - k g^T - g k^T + S k k^T with
+    g = P n and S = n^T g + R: symmetric by construction and of second order in an error of the gain.
     """
-    g = product(covariance, normal_b)
+    p = covariance
+    g = product(p, normal_b)
     s = dot(normal_b, g) + cell_variance
-    k = scale(1.0 / s, g)
+    inverse = 1.0 / s
+    k = scale(inverse, g)
+    # one factor of the symmetric pair: k g^T + g k^T - S k k^T = k h^T + h k^T
+    h = (g[0] - 0.5 * s * k[0], g[1] - 0.5 * s * k[1], g[2] - 0.5 * s * k[2])
     innovation = output - dot(normal_b, sun_b)
-    a = (
-        (1.0 - k[0] * normal_b[0], -k[0] * normal_b[1], -k[0] * normal_b[2]),
-        (-k[1] * normal_b[0], 1.0 - k[1] * normal_b[1], -k[1] * normal_b[2]),
-        (-k[2] * normal_b[0], -k[2] * normal_b[1], 1.0 - k[2] * normal_b[2]),
-    )
-    p = add_outer(congruence(a, covariance), cell_variance, k)
     sun_b = (sun_b[0] + k[0] * innovation, sun_b[1] + k[1] * innovation, sun_b[2] + k[2] * innovation)
-    return sun_b, p, innovation * innovation / s
+    return sun_b, subtract_pair(p, k, h), innovation * innovation * inverse
 
 
 @kernel
-def constrain(sun_b: Vec3, covariance: Symmetric, largest_variance: float) -> tuple[Vec3, Symmetric]:
-    """Unit state; covariance projected on the tangent plane, e^2/2 along the Sun line, bounded."""
-    sun_b = scale(1.0 / norm(sun_b), sun_b)
+def constrain(
+    sun_b: Vec3, predicted_b: Vec3, covariance: Symmetric, largest_variance: float
+) -> tuple[Vec3, Symmetric]:
+    """Unit state; covariance projected on the tangent plane, e^2/2 along the Sun line, bounded.
+
+    A state that updates brought to nothing has no direction: the unit vector `predicted_b` takes its place.
+    """
+    length = norm(sun_b)
+    sun_b = scale(1.0 / length, sun_b) if length > _NO_DIRECTION else predicted_b
     # T P T = P - s g^T - g s^T + (s g) s s^T with T = I - s s^T, g = P s
     g = product(covariance, sun_b)
     sg = dot(sun_b, g)
     h = (g[0] - 0.5 * sg * sun_b[0], g[1] - 0.5 * sg * sun_b[1], g[2] - 0.5 * sg * sun_b[2])
     tangent = trace(covariance) - sg
     along = 0.5 * tangent * tangent
-    p = (
-        covariance[0] - 2.0 * sun_b[0] * h[0],
-        covariance[1] - sun_b[0] * h[1] - h[0] * sun_b[1],
-        covariance[2] - sun_b[0] * h[2] - h[0] * sun_b[2],
-        covariance[3] - 2.0 * sun_b[1] * h[1],
-        covariance[4] - sun_b[1] * h[2] - h[1] * sun_b[2],
-        covariance[5] - 2.0 * sun_b[2] * h[2],
-    )
-    p = add_outer(p, along, sun_b)
+    p = add_outer(subtract_pair(covariance, sun_b, h), along, sun_b)
     diagonal = max(p[0], max(p[3], p[5]))
     if diagonal > largest_variance:
         # shrunk as a whole: clipping the diagonal alone can leave no covariance at all

@@ -46,6 +46,19 @@ def add_outer(p: Symmetric, k: float, v: Vec3) -> Symmetric:
 
 
 @kernel
+def subtract_pair(p: Symmetric, u: Vec3, v: Vec3) -> Symmetric:
+    """P - u v^T - v u^T."""
+    return (
+        p[0] - 2.0 * u[0] * v[0],
+        p[1] - u[0] * v[1] - v[0] * u[1],
+        p[2] - u[0] * v[2] - v[0] * u[2],
+        p[3] - 2.0 * u[1] * v[1],
+        p[4] - u[1] * v[2] - v[1] * u[2],
+        p[5] - 2.0 * u[2] * v[2],
+    )
+
+
+@kernel
 def scaled(p: Symmetric, k: float) -> Symmetric:
     """k P."""
     return (k * p[0], k * p[1], k * p[2], k * p[3], k * p[4], k * p[5])

@@ -10,14 +10,13 @@ Modes: 0 no Sun, 1 average of several cells, 2 a single cell (the error can reac
 brightest cell below an absolute gate.
 """
 
-import math
 from typing import NamedTuple
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, choice, flag, real
 from css_common.vectors import Vec3, norm, scale
 from css_estimation import sun_tracking
-from css_estimation.cell_layout import CellLayout, brightest, cell_layout
+from css_estimation.cell_layout import READABLE, CellLayout, brightest, cell_layout
 from css_estimation.sun_heading import NO_COVARIANCE, VALIDITY_NONE, VALIDITY_VALID, SunHeading
 from css_estimation.sun_tracking import (
     Estimate,
@@ -81,28 +80,25 @@ def initial_state(p: WavgParameters) -> TrackingState:
 
 
 @kernel
-def weighted_average(cells: CellLayout, gate: Gate, voltages) -> tuple[Vec3, int, int]:
+def weighted_average(cells: CellLayout, gate: Gate, voltages, top: int) -> tuple[Vec3, int, int]:
     """Sun heading (unit, in b), mask of the cells it uses, and mode; heading zero and mode 0 without a Sun.
 
     Args:
         voltages: (N,) cell outputs [-]; values that are not finite count as dark.
+        top: result of `brightest`.
     """
     n = cells.normals_b
-    top = brightest(voltages)
     if top < 0 or voltages[top] <= gate.minimum_output:
         return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
-    largest = voltages[top]
-    level = gate.level * largest if gate.relative else gate.level
+    level = gate.level * voltages[top] if gate.relative else gate.level
     x = y = z = 0.0
     mask = 0
     count = 0
     for i in range(voltages.shape[0]):
-        if voltages[i] > level and voltages[i] < math.inf:
-            # relative to the largest, so that no output overflows
-            weight = voltages[i] / largest
-            x += weight * n[i, 0]
-            y += weight * n[i, 1]
-            z += weight * n[i, 2]
+        if voltages[i] > level and voltages[i] < READABLE:
+            x += voltages[i] * n[i, 0]
+            y += voltages[i] * n[i, 1]
+            z += voltages[i] * n[i, 2]
             mask |= 1 << i
             count += 1
     if count == 0:
@@ -126,7 +122,8 @@ def step(
     """One cycle; arguments in `css_estimation.sun_heading`."""
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, gyro_b, gyro_valid)
-    sun_b, lit_mask, mode = weighted_average(p.cells, p.gate, voltages)
+    top = brightest(voltages)
+    sun_b, lit_mask, mode = weighted_average(p.cells, p.gate, voltages, top)
     valid = mode != MODE_NO_SUN
     if not valid and state.validity != VALIDITY_NONE:
         sun_b = state.sun_b
@@ -134,6 +131,5 @@ def step(
             sun_b = turned_sun(sun_b, gyro_b, dt)
     restarted = state.validity != VALIDITY_VALID
     estimate = Estimate(sun_b, NO_COVARIANCE, valid, restarted, 0.0, 0, lit_mask, mode)
-    top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0
     return finish_cycle(p.tracking, state, dt, largest, gyro_b, gyro_ok, eclipse_predicted, estimate)
