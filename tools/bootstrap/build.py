@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import shutil
 import subprocess
 from pathlib import Path
 
 from bootstrap import fingerprint
-from bootstrap.environment import SYSTEM, changes, compose, toolchain
+from bootstrap.environment import changes, compose, toolchain
 from bootstrap.plan import Need
 from bootstrap.progress import CommandFailed, Step, run
 from bootstrap.project import Environment, Refusal
@@ -44,7 +43,6 @@ def build(work: Work, need: Need) -> None:
     work.save()
     if need.packages:
         _colcon(work, need)
-    install_ros2(work)
     state.environment = _environment(work)
     work.save()
 
@@ -54,7 +52,8 @@ def _colcon(work: Work, need: Need) -> None:
     log = work.log("build.log")
     label = "building the ROS packages" if not work.state.packages else f"building {', '.join(names)}"
     python = work.project.python
-    command = [python, "-c", COLCON, "--log-base", "log/colcon", "build", *_selection(work, names), *OPTIONS]
+    command: list[str | Path] = [python, "-c", COLCON, "--log-base", "log/colcon", "build"]
+    command += [*_selection(work, names), *OPTIONS]
     failure = None
     with Step(label) as step:
         try:
@@ -69,7 +68,9 @@ def _colcon(work: Work, need: Need) -> None:
             raise failure
     if len(built) < len(names):
         missing = ", ".join(sorted(set(names) - set(built)))
-        raise Refusal(f"colcon did not build {missing}", f"the whole output is in {log.relative_to(work.project.root)}")
+        raise Refusal(
+            f"colcon did not build {missing}", f"the whole output is in {log.relative_to(work.project.root)}"
+        )
 
 
 def _selection(work: Work, names: list[str]) -> list[str]:
@@ -98,22 +99,15 @@ def _discard(work: Work, name: str) -> None:
 def _environment(work: Work) -> Environment:
     """What sourcing `install/local_setup.sh` adds to the environment of the tools."""
     tools = toolchain(work.project, work.ros)
-    before = compose(work.base, tools)
-    show = 'exec "$0" -I -S -c "import json, os; print(json.dumps(dict(os.environ)))"'
-    script = f". {work.project.install}/local_setup.sh >&2 && {show}"
-    if not (work.project.install / "local_setup.sh").is_file():
+    script = work.project.install / "local_setup.sh"
+    if not script.is_file():
         return tools
-    shown = subprocess.check_output(["sh", "-c", script, work.project.python], env=before)
-    added = changes(before, json.loads(shown))
-    prepend = {name: [*added.prepend.get(name, []), *tools.prepend.get(name, [])] for name in {**added.prepend, **tools.prepend}}
+    before = compose(work.base, tools)
+    code = "import json, os; print(json.dumps(dict(os.environ)))"
+    source = f'. "{script}" >&2 && exec "$0" -I -S -c "{code}"'
+    after = json.loads(subprocess.check_output(["sh", "-c", source, work.project.python], env=before))
+    added = changes(before, after)
+    prepend = dict(added.prepend)
+    for name, entries in tools.prepend.items():
+        prepend[name] = [*prepend.get(name, []), *entries]
     return Environment(assign={**tools.assign, **added.assign}, prepend=prepend)
-
-
-def install_ros2(work: Work) -> None:
-    """Put a small `ros2` command into the environment when no real one is there."""
-    if work.ros == SYSTEM and shutil.which("ros2", path=work.base.get("PATH")):
-        return
-    source = work.project.root / "tools" / "ros2.py"
-    target = work.project.venv / "bin" / "ros2"
-    target.write_text(f"#!{work.project.python}\n{source.read_text()}")
-    target.chmod(0o755)

@@ -4,21 +4,30 @@
 from __future__ import annotations
 
 import subprocess
-import sys
+import time
 from collections.abc import Mapping
 
 from bootstrap.project import Project
 
+LINTERS = (["ruff", "check"], ["mypy"])
 
-def run_checks(project: Project, arguments: list[str], env: Mapping[str, str]) -> int:
-    """Run all checks, the tests last; returns pytest's exit code, or 1 when only ruff or mypy complain."""
-    env = {**env, "ROS_PYTHON_CHECK_FIELDS": "1"}
-    failed = []
-    for tool in (["ruff", "check"], ["mypy"]):
-        print(f"== {' '.join(tool)}", flush=True)
-        if subprocess.call([project.python, "-m", *tool], env=env, cwd=project.root):
-            failed.append(tool[0])
-    verdict = f" ({' and '.join(failed)} failed above, so this run fails)" if failed else ""
-    print(f"== pytest{verdict}", flush=True)
-    code = subprocess.call([project.python, "-m", "pytest", *arguments], env=env, cwd=project.root)
-    return code or int(bool(failed))
+
+def failing_linters(project: Project, env: Mapping[str, str]) -> list[str]:
+    """Run ruff and mypy with their output shown; the names of those that complain."""
+    failing = []
+    for linter in LINTERS:
+        began = time.monotonic()
+        print(f"== {' '.join(linter)}", flush=True)
+        if subprocess.call([project.python, "-m", *linter], env=env, cwd=project.root):
+            failing.append(linter[0])
+        print(f"   {time.monotonic() - began:.1f} s", flush=True)
+    return failing
+
+
+def pytest_command(project: Project, arguments: list[str], failing: list[str]) -> list[str]:
+    """The command that runs the tests, and fails in the end for the linters that failed before it."""
+    pytest = [str(project.python), "-m", "pytest", *arguments]
+    if not failing:
+        return pytest
+    print(f"== {' and '.join(failing)} failed, see above; this run will fail", flush=True)
+    return ["bash", "-c", 'trap : INT; "$@"; code=$?; exit $((code ? code : 1))', "pytest", *pytest]

@@ -32,7 +32,7 @@ def main(arguments: list[str]) -> int:
             print(f"  {refusal.remedy}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print("sunpoint: interrupted; the next start continues", file=sys.stderr)
+        print("sunpoint: interrupted", file=sys.stderr)
         return 130
 
 
@@ -44,9 +44,7 @@ def _start(project: Project, verb: str, arguments: list[str]) -> int:
         state = _prepare(project, ros, base, with_tests=verb == "test")
     env = compose(base, state.environment)
     if verb == "test":
-        from bootstrap.checks import run_checks
-
-        return run_checks(project, arguments, env)
+        return _test(project, arguments, {**env, "ROS_PYTHON_CHECK_FIELDS": "1"})
     if verb == "shell":
         return _replace_process(_shell(project, arguments), {"ROS_PYTHON_CHECK_FIELDS": "1", **env})
     package, executable = VERBS[verb].package, VERBS[verb].executable
@@ -64,6 +62,14 @@ def _prepare(project: Project, ros: str, base: dict[str, str], with_tests: bool)
         return prepare(project, ros, base, with_tests)
     except Terminated as stop:
         sys.exit(stop.exit_code)
+
+
+def _test(project: Project, arguments: list[str], env: dict[str, str]) -> int:
+    """Run ruff and mypy, then become pytest."""
+    from bootstrap.checks import failing_linters, pytest_command
+
+    os.chdir(project.root)
+    return _replace_process(pytest_command(project, arguments, failing_linters(project, env)), env)
 
 
 def _shell(project: Project, arguments: list[str]) -> list[str]:

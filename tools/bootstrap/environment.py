@@ -12,20 +12,23 @@ from bootstrap.project import Environment, Project, Refusal
 DISTRIBUTION = "jazzy"
 WHEELS = "wheels"
 SYSTEM = "system"
+WHEELS_GUARD = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
 
 
 def without_other_sunpoint(env: Mapping[str, str]) -> dict[str, str]:
-    """A user's environment without what an enclosing `./sunpoint shell` put there, of this folder or another."""
+    """The environment without what an enclosing `./sunpoint shell` added, of this folder or another."""
     home = env.get("SUNPOINT_HOME")
     if not home:
         return dict(env)
     cleaned = {}
     for name, value in env.items():
-        kept = [part for part in value.split(os.pathsep) if part != home and not part.startswith(home + os.sep)]
+        parts = value.split(os.pathsep)
+        kept = [part for part in parts if part != home and not part.startswith(home + os.sep)]
         if kept:
             cleaned[name] = os.pathsep.join(kept)
     if env.get("SUNPOINT_ROS") == WHEELS:
-        cleaned.pop("ROS_DISTRO", None)
+        for name in ("ROS_DISTRO", WHEELS_GUARD):
+            cleaned.pop(name, None)
     return cleaned
 
 
@@ -59,7 +62,7 @@ def toolchain(project: Project, ros: str) -> Environment:
     )
     if ros == WHEELS:
         # The wheels' start hook executes Python a second time to set LD_LIBRARY_PATH, unless told it is set.
-        environment.assign["_ROS_WHEELS_BOOTSTRAP_COMPLETE"] = "1"
+        environment.assign[WHEELS_GUARD] = "1"
         site_packages = venv / "lib" / f"python{sys.version_info[0]}.{sys.version_info[1]}" / "site-packages"
         libraries = sorted(str(folder) for folder in site_packages.glob("ros_*.libs"))
         environment.prepend["LD_LIBRARY_PATH"] = [str(venv / "lib"), *libraries]

@@ -57,7 +57,7 @@ def check_libc() -> None:
         name, version, suitable = "another C library than glibc", "", False
     if not suitable:
         raise Refusal(
-            f"the ROS packages need glibc {'.'.join(map(str, OLDEST_GLIBC))} or newer; here is {name} {version}",
+            f"the ROS packages need glibc 2.28 or newer; here is {name} {version}",
             "use Debian 10, Ubuntu 20.04, RHEL 8 or newer, or a container of one",
         )
 
@@ -71,15 +71,27 @@ def system_python(env: Mapping[str, str]) -> str:
             python = shutil.which(name, path=env.get("PATH"))
             if python:
                 return python
-            raise Refusal(f"the sourced ROS in {prefix} is for {name}, which is not on PATH", f"sudo apt install {name}")
+            raise Refusal(
+                f"the sourced ROS in {prefix} is for {name}, which is not on PATH", f"sudo apt install {name}"
+            )
     raise Refusal(
         "ROS_DISTRO=jazzy is set, but no rclpy lies in any AMENT_PREFIX_PATH folder",
         "sudo apt install ros-jazzy-ros-base   or open a shell that sources no ROS",
     )
 
 
-def check(ros: str, env: Mapping[str, str]) -> None:
+def check_folder(root: Path) -> None:
+    """Raises Refusal for a folder name that lists of paths or the first lines of scripts cannot hold."""
+    if any(character in str(root) for character in " :;'\"$"):
+        raise Refusal(
+            f"the path {root} contains a space or one of : ; ' \" $, which ROS build tools cannot handle",
+            "move the project folder to a plain path",
+        )
+
+
+def check(root: Path, ros: str, env: Mapping[str, str]) -> None:
     """Raises Refusal naming the first thing that is missing."""
+    check_folder(root)
     check_venv_module()
     check_compiler(env)
     check_python_headers(sysconfig.get_path("include", "posix_prefix"))

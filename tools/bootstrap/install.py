@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 import sys
 from pathlib import Path
@@ -17,7 +16,7 @@ from bootstrap.work import Work
 def install(work: Work) -> None:
     """Make the environment anew. Packages come out of the installer's cache when they were there before."""
     project = work.project
-    host.check(work.ros, work.base)
+    host.check(project.root, work.ros, work.base)
     log = work.log("install.log")
     say("sunpoint: setting up inside this folder, needed once")
     for folder in (project.venv, project.build, project.install):
@@ -29,6 +28,7 @@ def install(work: Work) -> None:
     if work.ros != SYSTEM:
         with Step("adapting the ROS packages to this machine"):
             wheels.mend_cmake_files(project.venv / "share", *_include_folders(work))
+    _install_ros2(work)
     state = work.state
     state.install, state.test, state.packages = fingerprint.installation(project, work.ros), "", {}
     state.environment = toolchain(project, work.ros)
@@ -37,8 +37,9 @@ def install(work: Work) -> None:
 
 def install_tests(work: Work) -> None:
     """Add the tools that only the tests need."""
+    lock = work.project.root / "requirements-test.lock"
     with Step("installing the test tools") as step:
-        _uv(work, step, work.project.root / "requirements-test.lock", work.log("install-tests.log"), "--no-deps")
+        _uv(work, step, lock, work.log("install-tests.log"), "--no-deps")
     work.state.test = fingerprint.test_requirements(work.project)
     work.save()
 
@@ -49,7 +50,7 @@ def _make_venv(work: Work, log: Path) -> None:
     else:
         command = [getattr(sys, "_base_executable", sys.executable), "-m", "venv"]
     lock = work.project.root / "requirements-uv.lock"
-    pip = [work.project.python, "-m", "pip", "install", "--disable-pip-version-check"]
+    pip: list[str | Path] = [work.project.python, "-m", "pip", "install", "--disable-pip-version-check"]
     with Step("making the Python environment") as step:
         work.run(step, [*command, work.project.venv], log)
         work.run(step, [*pip, "--require-hashes", "-r", lock], log)
@@ -60,7 +61,7 @@ def _install_packages(work: Work, log: Path) -> None:
     # The one package that exists as source only is built with the locked setuptools too.
     options: list[str | Path] = ["--build-constraints", lock]
     if work.ros == SYSTEM:
-        has_colcon = work.ask_python("import importlib.util as u; print(u.find_spec('colcon_core') is not None)")
+        has_colcon = work.ask_python("import importlib.util as u; print(bool(u.find_spec('colcon_core')))")
         filtered = work.project.venv / "requirements-system.lock"
         filtered.write_text(requirements.for_system(lock.read_text(), has_colcon == "True"))
         lock, options = filtered, [*options, "--no-deps"]
@@ -69,15 +70,24 @@ def _install_packages(work: Work, log: Path) -> None:
 
 
 def _uv(work: Work, step: Step, lock: Path, log: Path, *options: str | Path) -> None:
-    uv = [work.project.venv / "bin" / "uv", "pip", "install", "--python", work.project.python]
-    work.run(step, [*uv, "--require-hashes", "-r", lock, *options], log)
+    uv: list[str | Path] = [work.project.venv / "bin" / "uv", "pip", "install"]
+    work.run(step, [*uv, "--python", work.project.python, "--require-hashes", "-r", lock, *options], log)
 
 
 def _include_folders(work: Work) -> tuple[str, str]:
     """The include folders of Python and numpy, as the environment itself names them."""
-    python, numpy = json.loads(
-        work.ask_python(
-            "import json, numpy, sysconfig; print(json.dumps([sysconfig.get_path('include'), numpy.get_include()]))"
-        )
-    )
+    code = "import numpy, sysconfig; print(sysconfig.get_path('include')); print(numpy.get_include())"
+    python, numpy = work.ask_python(code).splitlines()
     return python, numpy
+
+
+def _install_ros2(work: Work) -> None:
+    """Put a small `ros2` command into the environment when no real one is there."""
+    if work.ros == SYSTEM and shutil.which("ros2", path=work.base.get("PATH")):
+        return
+    source = work.project.root / "tools" / "ros2.py"
+    command = work.project.venv / "bin" / "ros2"
+    command.write_text(
+        f"#!{work.project.python}\nimport runpy\n\nrunpy.run_path({str(source)!r}, run_name='__main__')\n"
+    )
+    command.chmod(0o755)

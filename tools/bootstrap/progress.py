@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -70,15 +71,20 @@ class Step:
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         if self.live:
-            self._show("failed" if kind else f"{self._elapsed():.1f} s")
+            self._show(self._ending(kind))
             say("")
-        elif not kind:
-            say(f"sunpoint: {self.label}: {self._elapsed():.1f} s")
+        else:
+            say(f"sunpoint: {self.label}: {self._ending(kind)}")
 
     def tick(self) -> None:
         """Show that the step is alive."""
         if self.live:
             self._show(f"{self._elapsed():.0f} s")
+
+    def _ending(self, kind: type[BaseException] | None) -> str:
+        if kind is None:
+            return f"{self._elapsed():.1f} s"
+        return "failed" if issubclass(kind, Exception) else "stopped"
 
     def _elapsed(self) -> float:
         return time.monotonic() - self.began
@@ -97,7 +103,14 @@ def run(step: Step, command: Sequence[str | Path], env: Mapping[str, str], cwd: 
         output.write(f"$ {' '.join(map(str, command))}\n".encode())
         output.flush()
         process = subprocess.Popen(
-            command, env=dict(env), cwd=cwd, stdin=subprocess.DEVNULL, stdout=output, stderr=subprocess.STDOUT
+            command,
+            env=dict(env),
+            cwd=cwd,
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            process_group=0,  # stopped as a whole, with the compilers that it started
+            close_fds=False,  # the installation lock is inherited, to last while any command still works
         )
         try:
             while True:
@@ -116,9 +129,8 @@ def run(step: Step, command: Sequence[str | Path], env: Mapping[str, str], cwd: 
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    """End a command and wait for it, firmly when it does not listen."""
-    for ask, patience in ((process.terminate, 10.0), (process.kill, None)):
-        ask()
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=patience)
-            return
+    """End a command with everything it started, and wait for it; firmly when it does not listen."""
+    for number in (signal.SIGINT, signal.SIGKILL):
+        with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
+            os.killpg(process.pid, number)
+            process.wait(timeout=10)

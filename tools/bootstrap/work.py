@@ -28,6 +28,11 @@ NETWORK_SIGNS = (
 DISK_SIGNS = ("No space left on device", "Disk quota exceeded")
 
 
+def disk_full(project: Project) -> Refusal:
+    """The message for a full disk."""
+    return Refusal(f"no space left on the disk of {project.root}", "free 2 GB, then run it again")
+
+
 @dataclass
 class Work:
     """One pass over a workspace; `state` is saved after each part that succeeded."""
@@ -41,7 +46,9 @@ class Work:
     def env(self) -> dict[str, str]:
         """The environment for installing and building: tools and ROS, no package of the workspace."""
         quiet = {"UV_NO_PROGRESS": "1", "NO_COLOR": "1", "COLCON_DEFAULTS_FILE": os.devnull}
-        return {**compose(self.base, toolchain(self.project, self.ros)), **quiet}
+        # Without it colcon counts its own compilers as load and keeps one of two processors idle.
+        jobs = {"MAKEFLAGS": f"-j{os.cpu_count()}"}
+        return {**jobs, **compose(self.base, toolchain(self.project, self.ros)), **quiet}
 
     def save(self) -> None:
         """Remember what has been done so far."""
@@ -64,7 +71,7 @@ class Work:
         """The failure of a command as a message: a known cause by name, else the end of its output."""
         log = failure.log.relative_to(self.project.root)
         if any(sign in failure.output for sign in DISK_SIGNS):
-            return Refusal(f"no space left on the disk of {self.project.root}", "free 2 GB, then run it again")
+            return disk_full(self.project)
         if any(sign in failure.output for sign in NETWORK_SIGNS):
             return Refusal(
                 f"the package index (PyPI) could not be reached; {log} has the details",

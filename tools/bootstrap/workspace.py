@@ -6,6 +6,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import fcntl
+import os
 from collections.abc import Iterator, Mapping
 
 from bootstrap.build import build
@@ -13,7 +14,7 @@ from bootstrap.install import install, install_tests
 from bootstrap.plan import find_need
 from bootstrap.progress import say, stoppable
 from bootstrap.project import Project, Refusal, State
-from bootstrap.work import Work
+from bootstrap.work import Work, disk_full
 
 
 def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: bool) -> State:
@@ -37,16 +38,17 @@ def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: boo
             return state
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise Refusal(f"no space left on the disk of {project.root}", "free 2 GB, then run it again") from None
+            raise disk_full(project) from None
         if error.errno in (errno.EACCES, errno.EROFS):
-            raise Refusal(f"cannot write {error.filename}", "use a folder of your own, without sudo") from None
+            raise Refusal(f"cannot write {error.filename}", "use a folder that is your own") from None
         raise
 
 
 @contextlib.contextmanager
 def _alone(project: Project) -> Iterator[None]:
-    """Hold the project's installation lock; the system releases it however this process ends."""
+    """Hold the project's installation lock, which lasts as long as this process and its commands."""
     with (project.logs / "lock").open("w") as lock:
+        os.set_inheritable(lock.fileno(), True)
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
