@@ -10,15 +10,13 @@ A finished recording is one that has a `metadata.yaml`: it is written last, unde
 """
 
 import os
-from collections.abc import Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import IO, Self
+from typing import Self
 
-from mcap.writer import CompressionType, Writer
-
-from css_recording.bag_folder import create_file, prepare_folder, write_atomically
+from css_recording.bag_folder import prepare_folder, write_atomically
 from css_recording.bag_metadata import (
     METADATA_FILE,
     BagSummary,
@@ -26,16 +24,14 @@ from css_recording.bag_metadata import (
     absolute,
     bag_information,
     metadata_text,
-    qos_text,
     serialized_metadata,
 )
 from css_recording.errors import BagError
+from css_recording.mcap_output import McapOutput
 from css_recording.schemas import MessageSchema, schema_of
 from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
 
-LIBRARY = "sunpoint css_recording"
 METADATA_RECORD = "sunpoint"
-_MAX_CHUNK_BYTES = 1 << 20
 _ROS_DISTRO = "jazzy"  # where no ROS is sourced
 
 
@@ -69,34 +65,26 @@ class BagWriter:
         self.path = self.folder / (file_name or f"{self.folder.name}_0.mcap")
         self._topics: list[Topic] = []
         self._schemas: list[MessageSchema] = []
-        self._schema_ids: dict[MessageSchema, int] = {}
         self._index: dict[str, int] = {}
         self._channel_ids: list[int] = []
         self._counts: list[int] = []
         self._start_ns = self._end_ns = 0
         self._buffer = SecondBuffer(limits)
+        self._open = True
         self._failure: str | None = None
+        # An unknown type is found before anything is on the disk.
+        defined = [topic._replace(schema=topic.schema or schema_of(topic.type)) for topic in topics]
         prepare_folder(self.folder, overwrite)
-        self._file: IO[bytes] | None = create_file(self.path)
-        # Summary offsets are optional, and the library writes one that points to nothing when a file has no
-        # attachment, which checkers of the format report as an error.
-        self._writer = Writer(
-            self._file,
-            chunk_size=_MAX_CHUNK_BYTES,
-            compression=CompressionType.ZSTD,
-            use_summary_offsets=False,
-        )
+        self._output = McapOutput(self.path)
         try:
-            self._writer.start(profile="ros2", library=LIBRARY)
+            with self._disk():
+                self._output.start()
             if metadata:
-                self._writer.add_metadata(METADATA_RECORD, dict(metadata))
-            self._file.flush()
-            for topic in topics:
+                self.add_metadata(METADATA_RECORD, metadata)
+            for topic in defined:
                 self.add_topic(topic)
-        except OSError as error:
-            raise self._fail(error) from error
         except BagError:
-            self._abandon()
+            self._output.abandon()
             raise
 
     @property
@@ -120,7 +108,7 @@ class BagWriter:
     @property
     def closed(self) -> bool:
         """Whether the recording is over, finished or failed."""
-        return self._file is None
+        return not self._open
 
     def add_topic(self, topic: Topic) -> None:
         """Make a topic known. Repeating it with the same type changes nothing."""
@@ -131,21 +119,13 @@ class BagWriter:
             if known != topic.type:
                 raise BagError(f"{self.folder}: topic {name} is recorded as {known}, not as {topic.type}")
             return
+        topic = topic._replace(name=name)
         schema = topic.schema or schema_of(topic.type)
-        if schema not in self._schema_ids:
-            self._schema_ids[schema] = self._writer.register_schema(
-                schema.type_name, "ros2msg", schema.text.encode()
-            )
-        channel = self._writer.register_channel(
-            name,
-            "cdr",
-            self._schema_ids[schema],
-            {"offered_qos_profiles": qos_text(topic.qos), "topic_type_hash": schema.type_hash},
-        )
+        with self._disk():
+            self._channel_ids.append(self._output.add_channel(topic, schema))
         self._index[name] = len(self._topics)
-        self._topics.append(topic._replace(name=name))
+        self._topics.append(topic)
         self._schemas.append(schema)
-        self._channel_ids.append(channel)
         self._counts.append(0)
 
     def write(self, topic: str, stamp_ns: int, data: bytes, publish_time_ns: int | None = None) -> None:
@@ -157,7 +137,7 @@ class BagWriter:
         publish_time_ns: default: the stamp.
         """
         index = self._index.get(topic)
-        if index is None or stamp_ns < 0 or self._file is None:
+        if index is None or stamp_ns < 0 or not self._open:
             self._check_open()
             reason = "was not added to the recording" if index is None else f"stamp {stamp_ns} before 1970"
             raise BagError(f"{self.folder}: topic {topic}: {reason}")
@@ -169,20 +149,14 @@ class BagWriter:
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Store a named set of texts at once, between the messages: an event, a parameter that changed."""
         self._check_open()
-        try:
-            self._writer.add_metadata(name, dict(entries))
-            self._writer.flush()
-        except OSError as error:
-            raise self._fail(error) from error
+        with self._disk():
+            self._output.add_metadata(name, entries)
 
     def attach(self, name: str, media_type: str, data: bytes, stamp_ns: int) -> None:
         """Store a file in the recording."""
         self._check_open()
-        try:
-            self._writer.add_attachment(stamp_ns, stamp_ns, name, media_type, data)
-            self._writer.flush()
-        except OSError as error:
-            raise self._fail(error) from error
+        with self._disk():
+            self._output.attach(name, media_type, data, stamp_ns)
 
     def flush(self) -> None:
         """Hand everything received so far to the operating system."""
@@ -191,23 +165,18 @@ class BagWriter:
 
     def close(self) -> None:
         """Finish the recording. Closing it again does nothing."""
-        if self._file is None:
+        if not self._open:
             return
         self.flush()
         distro = os.environ.get("ROS_DISTRO", _ROS_DISTRO)
         summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
-        try:
+        with self._disk():
             # One record only: of several, some readers take the first and others the last.
-            self._writer.add_metadata("rosbag2", {"serialized_metadata": serialized_metadata(information)})
-            self._writer.finish()
-            self._file.flush()
-            os.fsync(self._file.fileno())
-            self._file.close()
+            self._output.add_metadata("rosbag2", {"serialized_metadata": serialized_metadata(information)})
+            self._output.finish()
             write_atomically(self.folder / METADATA_FILE, metadata_text(information))
-        except OSError as error:
-            raise self._fail(error) from error
-        self._file = None
+        self._open = False
 
     def __enter__(self) -> Self:
         return self
@@ -222,36 +191,35 @@ class BagWriter:
                 self.close()
 
     def _store(self, batches: list[list[Message]]) -> None:
-        """Write each batch as a chunk, or several when it exceeds the size of one."""
-        channel_ids, counts, add_message = self._channel_ids, self._counts, self._writer.add_message
-        try:
-            for batch in batches:
-                is_first = not any(counts)
-                for stamp_ns, index, data, publish_time_ns in batch:
-                    counts[index] += 1
-                    sequence = counts[index] & 0xFFFFFFFF
-                    add_message(channel_ids[index], stamp_ns, data, publish_time_ns, sequence)
-                self._writer.flush()
-                self._start_ns = batch[0][0] if is_first else min(self._start_ns, batch[0][0])
-                self._end_ns = max(self._end_ns, batch[-1][0])
-        except OSError as error:
-            raise self._fail(error) from error
+        """Write each batch as a chunk."""
+        for batch in batches:
+            is_first = not any(self._counts)
+            self._start_ns = batch[0][0] if is_first else min(self._start_ns, batch[0][0])
+            self._end_ns = max(self._end_ns, batch[-1][0])
+            with self._disk():
+                self._output.write_chunk(self._numbered(batch))
+
+    def _numbered(self, batch: list[Message]) -> Iterator[tuple[int, int, int, int, bytes]]:
+        """Messages with the numbers of their channels and their places in them."""
+        channel_ids, counts = self._channel_ids, self._counts
+        for stamp_ns, index, data, publish_time_ns in batch:
+            counts[index] = count = counts[index] + 1
+            yield channel_ids[index], count & 0xFFFFFFFF, stamp_ns, publish_time_ns, data
 
     def _check_open(self) -> None:
-        if self._file is None:
+        if not self._open:
             raise BagError(self._failure or f"{self.folder}: the recording is closed")
 
-    def _fail(self, error: OSError) -> BagError:
-        self._failure = (
-            f"{self.path}: cannot write the recording: {error.strerror or error}; "
-            f"`recover {self.folder}` keeps what was written before"
-        )
-        self._abandon()
-        return BagError(self._failure)
-
-    def _abandon(self) -> None:
-        """Let go of the file without finishing it."""
-        if self._file is not None:
-            with suppress(OSError):
-                self._file.close()
-            self._file = None
+    @contextmanager
+    def _disk(self) -> Iterator[None]:
+        """Ends the recording when the disk refuses to take what is written inside."""
+        try:
+            yield
+        except OSError as error:
+            self._output.abandon()
+            self._open = False
+            self._failure = (
+                f"{self.path}: cannot write the recording: {error.strerror or error}; "
+                f"`recover {self.folder}` keeps what was written before"
+            )
+            raise BagError(self._failure) from error

@@ -222,4 +222,3 @@ def _map_file(path: Path) -> mmap.mmap | bytes:
             return mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error
-

@@ -7,6 +7,7 @@ a reader can tell whether its own definition is the recorded one.
 """
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from css_recording.errors import BagError
 
 _SEPARATOR = "=" * 80
+_CHAR = re.compile(r"^\s*char\b", re.MULTILINE)
 _PRIMITIVES = frozenset(
     ["bool", "byte", "char", "string", "wstring", "float32", "float64"]
     + [f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)]
@@ -74,14 +76,12 @@ def schema_of(type_name: str) -> MessageSchema:
 
 def hash_of(type_name: str, text: str) -> str:
     """RIHS01 hash computed from a `ros2msg` schema text with all its dependencies."""
-    # The root type comes last: its text ends where the first separator begins, and get_types_from_msg reads
-    # each of the parts under its own name.
-    types = {}
+    text = _CHAR.sub("uint8", text)  # what ROS 2 makes of it; rosbags would hash it as a type of its own
     root, *others = text.split(f"{_SEPARATOR}\nMSG: ")
-    types.update(get_types_from_msg(root, type_name))
+    types = dict(get_types_from_msg(root, type_name))
     for other in others:
         name, _, definition = other.partition("\n")
-        package, base = name.strip().split("/")[0], name.strip().split("/")[-1]
+        package, base = name.strip().split("/")
         types.update(get_types_from_msg(definition, f"{package}/msg/{base}"))
     store = get_typestore(Stores.EMPTY)
     store.register(types)

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What rosbag2 of Jazzy needs of a recording, requirement by requirement.
+
+Sources: ros2/rosbag2, `rosbag2_storage_mcap/src/mcap_storage.cpp` and `rosbag2_storage/yaml.hpp`; the MCAP
+specification. rosbag2 itself is not among the wheels that Sunpoint installs.
+"""
+
+import pytest
+import yaml
+from mcap.reader import NonSeekingReader, make_reader
+from mcap.records import Chunk, MessageIndex
+from mcap.stream_reader import StreamReader
+
+from css_recording.bag_metadata import QosProfile, Topic, parse_qos
+from css_recording.bag_writer import BagWriter
+from css_recording.schemas import schema_of
+
+QOS = QosProfile("best_effort", "transient_local", "keep_last", 7)
+
+
+@pytest.fixture(scope="module")
+def recording(flight, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("layout") / "orbit_7"
+    topics = [flight.topics[0]._replace(qos=(QOS,)), *flight.topics[1:]]
+    with BagWriter(folder, topics, {"mission": "x", "numba": "1"}) as writer:
+        for message in flight.messages(45):
+            writer.write(*message)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def summary(recording):
+    with (recording / "orbit_7_0.mcap").open("rb") as file:
+        return make_reader(file).get_summary()
+
+
+@pytest.fixture(scope="module")
+def information(recording):
+    return yaml.safe_load((recording / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+
+
+def file_metadata(recording, name):
+    with (recording / "orbit_7_0.mcap").open("rb") as file:
+        return [record.metadata for record in make_reader(file).iter_metadata() if record.name == name]
+
+
+def test_folder_holds_the_two_files_of_a_rosbag2_recording(recording):
+    assert sorted(path.name for path in recording.iterdir()) == ["metadata.yaml", "orbit_7_0.mcap"]
+
+
+def test_profile_is_ros2(recording):
+    with (recording / "orbit_7_0.mcap").open("rb") as file:
+        assert make_reader(file).get_header().profile == "ros2"
+
+
+def test_statistics_exist_and_are_right(summary):
+    # mcap_storage.cpp takes .value() of the statistics without looking
+    statistics = summary.statistics
+    assert statistics.message_count == 3 * 45
+    assert set(statistics.channel_message_counts.values()) == {45}
+    assert statistics.message_end_time - statistics.message_start_time == 44 * 100_000_000
+    assert statistics.metadata_count == len(summary.metadata_indexes) == 2
+
+
+def test_every_channel_has_a_schema_in_ros2msg_and_says_cdr(summary):
+    assert len(summary.channels) == 3
+    for channel in summary.channels.values():
+        schema = summary.schemas[channel.schema_id]
+        assert channel.message_encoding == "cdr"
+        assert schema.encoding == "ros2msg"
+        assert schema.data.decode() == schema_of(schema.name).text
+        assert "=" * 80 + "\nMSG: std_msgs/Header\n" in schema.data.decode()
+
+
+def test_channels_carry_quality_of_service_and_type_hash(summary):
+    for channel in summary.channels.values():
+        type_name = summary.schemas[channel.schema_id].name
+        assert channel.metadata["topic_type_hash"] == schema_of(type_name).type_hash
+        profiles = yaml.safe_load(channel.metadata["offered_qos_profiles"])
+        assert isinstance(profiles, list)
+        expected = QOS if channel.topic == "/css/voltages" else QosProfile()
+        assert parse_qos(channel.metadata["offered_qos_profiles"]) == (expected,)
+        # to_rclcpp_qos_vector reads each of these with .as<>() and throws when one is missing
+        assert set(profiles[0]) == {
+            "history", "depth", "reliability", "durability", "deadline", "lifespan", "liveliness",
+            "liveliness_lease_duration", "avoid_ros_namespace_conventions",
+        }  # fmt: skip
+        assert profiles[0]["deadline"] == {"sec": 9223372036, "nsec": 854775807}
+
+
+def test_serialized_metadata_is_there_once_and_says_the_same_as_the_yaml_file(recording, information):
+    # without it the reader assumes version 8 and fails on the quality of service of version 9
+    (record,) = file_metadata(recording, "rosbag2")
+    assert yaml.safe_load(record["serialized_metadata"]) == information
+
+
+def test_metadata_have_every_field_of_version_9(information):
+    assert set(information) == {
+        "version", "storage_identifier", "duration", "starting_time", "message_count",
+        "topics_with_message_count", "compression_format", "compression_mode", "relative_file_paths", "files",
+        "custom_data", "ros_distro",
+    }  # fmt: skip
+    assert information["version"] == 9
+    assert information["storage_identifier"] == "mcap"
+    assert information["relative_file_paths"] == ["orbit_7_0.mcap"]
+    assert information["compression_format"] == information["compression_mode"] == ""
+    assert information["ros_distro"] == "jazzy"
+    (file,) = information["files"]
+    assert file["path"] == "orbit_7_0.mcap"
+    assert file["message_count"] == information["message_count"] == 3 * 45
+    assert file["duration"] == information["duration"]
+
+
+def test_times_are_those_of_the_file(summary, information):
+    start = information["starting_time"]["nanoseconds_since_epoch"]
+    assert start == summary.statistics.message_start_time
+    assert start + information["duration"]["nanoseconds"] == summary.statistics.message_end_time
+
+
+def test_topics_agree_with_the_channels(summary, information):
+    topics = {entry["topic_metadata"]["name"]: entry for entry in information["topics_with_message_count"]}
+    assert set(topics) == {channel.topic for channel in summary.channels.values()}
+    for channel in summary.channels.values():
+        entry = topics[channel.topic]
+        assert entry["message_count"] == summary.statistics.channel_message_counts[channel.id]
+        assert entry["topic_metadata"]["serialization_format"] == "cdr"
+        assert entry["topic_metadata"]["type"] == summary.schemas[channel.schema_id].name
+        assert entry["topic_metadata"]["type_description_hash"] == channel.metadata["topic_type_hash"]
+        assert entry["topic_metadata"]["offered_qos_profiles"] == yaml.safe_load(
+            channel.metadata["offered_qos_profiles"]
+        )
+
+
+def test_yaml_has_no_anchors(recording):
+    text = (recording / "metadata.yaml").read_text()
+    assert "&" not in text and "*" not in text
+
+
+def test_chunks_are_compressed_by_second_and_indexed(recording, summary):
+    assert len(summary.chunk_indexes) == 5  # 4.5 s
+    for index in summary.chunk_indexes:
+        assert index.compression == "zstd"
+        assert index.message_index_length > 0
+        assert index.message_start_time // 10**9 == index.message_end_time // 10**9
+        assert len(index.message_index_offsets) == 3
+    with (recording / "orbit_7_0.mcap").open("rb") as file:
+        records = list(StreamReader(file, emit_chunks=True).records)
+    chunks = [record for record in records if isinstance(record, Chunk)]
+    indexed = sum(len(record.records) for record in records if isinstance(record, MessageIndex))
+    assert len(chunks) == 5
+    assert indexed == 3 * 45
+
+
+def test_messages_stand_in_log_time_order_with_running_sequence_numbers(recording):
+    with (recording / "orbit_7_0.mcap").open("rb") as file:
+        seen = [
+            (message.log_time, channel.id, message.sequence)
+            for _, channel, message in NonSeekingReader(file).iter_messages(log_time_order=False)
+        ]
+    assert seen == sorted(seen)
+    for channel_id in (1, 2, 3):
+        assert [sequence for _, channel, sequence in seen if channel == channel_id] == list(range(1, 46))
+
+
+def test_mission_and_versions_are_in_the_file(recording):
+    assert file_metadata(recording, "sunpoint") == [{"mission": "x", "numba": "1"}]
+
+
+def test_a_bare_file_carries_everything_the_yaml_file_says(recording, information, tmp_path):
+    # so that rosbag2's reindex loses nothing when metadata.yaml is gone
+    (record,) = file_metadata(recording, "rosbag2")
+    assert (
+        yaml.safe_load(record["serialized_metadata"])["topics_with_message_count"]
+        == (information["topics_with_message_count"])
+    )
+
+
+def test_stamps_before_1970_are_refused(flight, tmp_path):
+    from css_recording.errors import BagError
+
+    with BagWriter(tmp_path / "bag", flight.topics) as writer, pytest.raises(BagError, match="before 1970"):
+        writer.write("/css/voltages", -1, b"\0\1\0\0")
+
+
+def test_two_topics_of_one_type_share_a_schema(flight, tmp_path):
+    topics = [Topic("a", flight.topics[0].type), Topic("/b", flight.topics[0].type)]
+    with BagWriter(tmp_path / "bag", topics) as writer:
+        pass
+    with writer.path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert len(summary.schemas) == 1
+    assert sorted(channel.topic for channel in summary.channels.values()) == ["/a", "/b"]
