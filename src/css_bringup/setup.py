@@ -20,6 +20,7 @@ setup(
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
         (f"share/{PACKAGE}", ["package.xml"]),
+        (f"share/{PACKAGE}/launch", ["launch/mission.launch.py"]),
     ],
     entry_points={"console_scripts": EXECUTABLES},
     zip_safe=False,

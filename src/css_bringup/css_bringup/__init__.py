@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Composes, supervises, launches, records and replays Sunpoint missions."""
+"""Brings whole missions up: composed in one process, one process per node, launched, replayed, benchmarked."""

@@ -5,6 +5,7 @@ Parameters, topics, checks at the edge, stamp matching, scripted events, diagnos
 component; what only the node that owns simulated time does is in `css_common.plant_host`.
 """
 
+import time
 import traceback
 from collections import Counter
 from functools import partial
@@ -68,6 +69,7 @@ class ComponentNode(LifecycleNode):
         self._is_active = False
         self._seen_errors: set[str] = set()
         self._last_stamp = 0
+        self._began: tuple[float, float] | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._watch_timer = self.create_timer(1.0, self._publish_diagnostics, clock=self._steady)
@@ -213,6 +215,19 @@ class ComponentNode(LifecycleNode):
         for publisher, *_ in self._output_ports.values():
             publisher.wait_for_all_acked(timeout)
 
+    def _mark_begin(self) -> None:
+        self._began = (time.perf_counter(), time.process_time())
+
+    def summary(self) -> dict:
+        """Figures of the run: wall and processor time [s] since the first cycle, last stamp, counters."""
+        wall, cpu = self._began or (time.perf_counter(), time.process_time())
+        return {
+            "wall_s": time.perf_counter() - wall,
+            "cpu_s": time.process_time() - cpu,
+            "last_stamp_ns": self._last_stamp,
+            "counters": self.health()[2],
+        }
+
     # Messages
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
@@ -234,6 +249,8 @@ class ComponentNode(LifecycleNode):
         if self._events:
             self._apply_events(stamp_ns)
         self._last_stamp = stamp_ns
+        if self._began is None:
+            self._mark_begin()
         component = self.component
         try:
             outgoing = (component.cycle if self._is_active else component.idle)(stamp_ns, received)

@@ -97,6 +97,7 @@ class PlantNode(ComponentNode):
         outgoing = self.component.begin()
         self._begun = True
         self._warned.clear()
+        self._mark_begin()
         self._go_to(self.mission.epoch_ns, outgoing)
 
     def _absent_partners(self) -> list[str]:

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """`main` of every node executable: command line, mission, ROS start, clean end."""
 
+import json
 import signal
 import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
@@ -43,9 +45,17 @@ def create_node(component_type: type[Component], name: str, mission: Mission, **
 
 
 def run_node(component_type: type[Component], arguments: list[str]) -> int:
-    """Runs one node until it is told to stop; 0 on a clean end, 1 when it failed, 2 on bad parameters."""
+    """Runs one node until it is told to stop; 0 on a clean end, 1 when it failed, 2 on bad parameters.
+
+    `--summary FILE` before `--ros-args` leaves the figures of the run in a JSON file at its end.
+    """
     executable = component_type.__module__.rpartition(".")[2]
     node = None
+    summary = None
+    if "--summary" in arguments[:-1]:
+        at = arguments.index("--summary")
+        summary = Path(arguments[at + 1])
+        arguments = arguments[:at] + arguments[at + 2 :]
     try:
         mission = mission_of_arguments(component_type, arguments)
         rclpy.init(args=[sys.argv[0], *arguments])
@@ -66,6 +76,8 @@ def run_node(component_type: type[Component], arguments: list[str]) -> int:
     finally:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C must not tear the clean-up apart
         if node is not None:
+            if summary is not None:
+                summary.write_text(json.dumps(node.summary()), encoding="utf-8")
             node.finish()
             node.destroy_node()
         rclpy.try_shutdown()

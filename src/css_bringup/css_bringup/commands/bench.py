@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Measures the speed of the flight software on this machine.
+
+graph: the mission's graph in lockstep, composed in one process and as one process per node, recorded and not.
+Figures are the real-time factor (simulated over wall time) and processor time a control cycle.
+"""
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from rich.table import Table
+
+from css_bringup.flight import FlightResult
+from css_bringup.flying import fly
+from css_bringup.options import FAILED, console, errors, guarded
+from css_bringup.report import print_json
+from css_common.mission import Mission, load_mission
+
+_CONFIGURATIONS = {
+    "composed": (False, False),
+    "composed_recorded": (False, True),
+    "processes": (True, False),
+    "processes_recorded": (True, True),
+}
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("subject", choices=("graph",), help="what to measure")
+    parser.add_argument("--mission", default="okeefe_2013", help="mission to fly (default: %(default)s)")
+    parser.add_argument("--duration", type=float, default=300.0, help="simulated time of one flight [s] (default: 300)")
+    parser.add_argument("--repeats", type=int, default=3, help="flights of each kind; medians are printed (default: 3)")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
+    return parser
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point."""
+    arguments = _parser().parse_args(args)
+    return guarded(lambda: _run(arguments))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    # field checks of messages are for tests: they cost a fifth of the loop
+    os.environ.pop("ROS_PYTHON_CHECK_FIELDS", None)
+    mission = load_mission(arguments.mission, [f"mission.duration={arguments.duration}"])
+    measured: dict[str, list[FlightResult]] = {name: [] for name in _CONFIGURATIONS}
+    # kinds interleaved, so that a slow minute of the machine falls on all of them
+    for _ in range(max(1, arguments.repeats)):
+        for name, (processes, recorded) in _CONFIGURATIONS.items():
+            result = _fly_once(mission, processes=processes, recorded=recorded)
+            if result.failure or result.interrupted:
+                errors.print(f"[red]{name}: the flight failed:[/red] {result.failure or 'interrupted'}")
+                return FAILED
+            measured[name].append(result)
+    figures = {name: _figures(results) for name, results in measured.items()}
+    table = Table("graph", "real-time factor", "CPU us per step", "messages lost")
+    for name, row in figures.items():
+        table.add_row(
+            name, f"{row['realtime_factor']:.0f}", f"{row['cpu_us_per_step']:.0f}", str(row["messages_lost"])
+        )
+    console.print(table)
+    if arguments.json:
+        print_json(figures)
+    return 0
+
+
+def _fly_once(mission: Mission, *, processes: bool, recorded: bool) -> FlightResult:
+    with tempfile.TemporaryDirectory(prefix="sunpoint_bench_") as folder:
+        bag = Path(folder) / "flight" if recorded else None
+        return fly(mission, bag, processes=processes, console=console)
+
+
+def _figures(results: list[FlightResult]) -> dict[str, Any]:
+    return {
+        "realtime_factor": round(median(r.realtime_factor for r in results), 1),
+        "cpu_us_per_step": round(median(1e6 * r.cpu_s / r.steps for r in results), 1),
+        "messages_lost": max(r.messages_lost for r in results),
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())

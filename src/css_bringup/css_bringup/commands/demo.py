@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies one orbit from a tumble, records it, replays it through every Sun estimator and draws what happened.
+
+A spacecraft with eight coarse sun sensors tumbles at up to 2 deg/s about each axis. The Kalman filter finds the Sun
+with help of a gyro, four reaction wheels turn the solar arrays to it, the recording is then stepped through weighted
+average and Kalman filter, each with gyro and without.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from css_bringup.commands.replay import print_replay
+from css_bringup.flight import default_bag
+from css_bringup.flying import fly
+from css_bringup.options import (
+    FAILED,
+    INTERRUPTED,
+    add_mission_options,
+    add_output_options,
+    console,
+    errors,
+    guarded,
+    mission_of,
+)
+from css_bringup.replay import parse_request
+from css_bringup.replaying import replay
+from css_bringup.report import print_json, print_result, result_object, unmet
+from css_studies.flight_figures import write_figures
+from css_studies.flight_log import read_flight
+from css_studies.flight_metrics import estimator_runs
+
+_REPLAYED = ("ekf", "ekf:gyro=off", "wavg", "wavg:gyro=off")
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add_mission_options(parser)
+    add_output_options(parser)
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="where figures go (default: beside the recording)")
+    return parser
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point."""
+    arguments = _parser().parse_args(args)
+    return guarded(lambda: _run(arguments))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    mission = mission_of(arguments)
+    bag = arguments.out or default_bag(mission)
+    console.print(
+        f"Flying {mission.name}, case {mission.values.mission.case}: {mission.values.mission.duration:g} s simulated, "
+        f"nodes {', '.join(node.name for node in mission.nodes)}",
+        soft_wrap=True,
+    )
+    flight = fly(mission, bag, processes=False, console=console)
+    if flight.interrupted:
+        errors.print(f"interrupted; the recording up to here is complete: {bag}", soft_wrap=True)
+        return INTERRUPTED
+    if flight.failure:
+        errors.print(f"[red]the flight failed:[/red] {flight.failure}", soft_wrap=True)
+        return FAILED
+    log = read_flight(bag)
+    flown = estimator_runs(log, [mission.values.graph.estimator])
+    print_result(console, flight, flown)
+    console.print("\nReplaying the recording through every Sun estimator, with gyro and without:")
+    replayed = replay(bag, bag.with_name(f"{bag.name}_replay"), mission, map(parse_request, _REPLAYED), {})
+    print_replay(replayed)
+    for file in write_figures([log, replayed.log], arguments.figures or bag.with_name(f"{bag.name}_figures")):
+        console.print(f"figure: {file}", soft_wrap=True)
+    runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
+    if arguments.json:
+        print_json(result_object(flight, runs))
+    missed = unmet(flight, flown)
+    for line in missed:
+        errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
+    return FAILED if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies a mission on the real graph and records it."""
+
+import argparse
+import sys
+
+from css_bringup.flight import FlightResult, default_bag
+from css_bringup.flying import fly
+from css_bringup.options import (
+    FAILED,
+    INTERRUPTED,
+    add_mission_options,
+    add_output_options,
+    console,
+    errors,
+    guarded,
+    mission_of,
+)
+from css_bringup.report import print_json, print_result, result_object, unmet
+from css_common.mission import Mission
+from css_studies.flight_log import read_flight
+from css_studies.flight_metrics import estimator_runs
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="fly", description=__doc__)
+    add_mission_options(parser)
+    parser.add_argument("--processes", action="store_true", help="one supervised process per node")
+    parser.add_argument(
+        "--realtime", type=float, nargs="?", const=1.0, metavar="FACTOR",
+        help="pace against the wall clock (default factor 1.0)",
+    )  # fmt: skip
+    parser.add_argument("--no-record", action="store_true", help="fly without a recording (and without figures of merit)")
+    add_output_options(parser)
+    return parser
+
+
+def main(args: list[str] | None = None) -> int:
+    """Entry point; 0: flown and all pass criteria of the mission met."""
+    arguments = _parser().parse_args(args)
+    return guarded(lambda: _run(arguments))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    if arguments.realtime is not None:
+        arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
+    mission = mission_of(arguments)
+    bag = None if arguments.no_record else (arguments.out or default_bag(mission))
+    result = fly(mission, bag, processes=arguments.processes, console=console)
+    return conclude(mission, result, as_json=arguments.json)
+
+
+def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
+    """Prints a flight's result and turns it into an exit code."""
+    runs = []
+    if result.bag is not None and result.steps > 0:
+        runs = estimator_runs(read_flight(result.bag))
+    print_result(console, result, runs)
+    if result.failure:
+        errors.print(f"[red]the flight failed:[/red] {result.failure}", soft_wrap=True)
+    missed = unmet(result, runs)
+    for line in missed:
+        errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
+    if as_json:
+        print_json(result_object(result, runs))
+    if result.interrupted:
+        errors.print("interrupted; the recording up to here is complete")
+        return INTERRUPTED
+    return FAILED if result.failure or missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

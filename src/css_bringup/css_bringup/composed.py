@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A mission flown in one process: every node of the graph in one executor, real topics, the recorder included."""
+
+import gc
+import time
+from pathlib import Path
+
+from rclpy.context import Context
+from rclpy.executors import ExternalShutdownException
+
+from css_bringup.flight import FlightResult, Progress
+from css_common.executor import create_executor, spin_until
+from css_common.host import ComponentNode
+from css_common.mission import Mission
+from css_common.plant_host import PlantNode
+from css_common.run import create_node
+from css_recording.recorder import RecorderNode
+
+_PROGRESS_EVERY = 0.2
+
+
+class ComposedFlight:
+    """The nodes of a mission in one process.
+
+    Use as a context manager: nodes exist inside it, `fly` may be called once, `nodes` are there to be inspected.
+    """
+
+    def __init__(self, mission: Mission, bag: Path | None = None, executor: str | None = None) -> None:
+        """Prepares a flight.
+
+        Args:
+            mission: what to fly; it must have a plant.
+            bag: where to record; None records nothing.
+            executor: kind of executor, see `create_executor`.
+        """
+        self.mission = mission
+        self.bag = bag
+        self.context = Context()
+        self.nodes: dict[str, ComponentNode] = {}
+        self.recorder: RecorderNode | None = None
+        self._executor_kind = executor
+
+    def __enter__(self) -> "ComposedFlight":
+        if self.mission.plant is None:
+            raise ValueError(f"{self.mission.name}: no node of graph.nodes owns simulated time")
+        self.context.init()
+        self.executor = create_executor(self._executor_kind, self.context)
+        options = {"context": self.context, "use_global_arguments": False}
+        mission = self.mission
+        if self.bag is not None:
+            mission = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
+            self.recorder = RecorderNode(self.mission, self.bag, **options)
+            self.executor.add_node(self.recorder)
+        for node in mission.nodes:
+            self.nodes[node.name] = create_node(node.component, node.name, mission, **options)
+            self.executor.add_node(self.nodes[node.name])
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self.recorder is not None:
+            self.recorder.close()
+        for node in (*self.nodes.values(), *filter(None, [self.recorder])):
+            self.executor.remove_node(node)
+            node.destroy_node()
+        self.executor.shutdown()
+        self.context.try_shutdown()
+
+    @property
+    def plant(self) -> PlantNode:
+        """The node that owns simulated time."""
+        node = self.nodes[self.mission.plant.name]
+        assert isinstance(node, PlantNode)
+        return node
+
+    def fly(self, progress: Progress | None = None) -> FlightResult:
+        """Flies the mission to its end, or until interrupted."""
+        result = FlightResult(self.mission, bag=self.bag)
+        for node in self.nodes.values():
+            if node is not self.plant and not node.start():
+                result.failure = f"{node.get_name()} did not start"
+                return result
+        if not self.plant.start():
+            result.failure = f"{self.plant.get_name()} did not start"
+            return result
+        try:
+            # until the first step is out, partners are being matched: not part of the flight's time
+            self._spin(lambda: self.plant.begun or self.plant.done, None)
+            gc.collect()
+            gc.freeze()
+            wall, cpu = time.perf_counter(), time.process_time()
+            try:
+                self._spin(lambda: self.plant.done, progress)
+            finally:
+                result.wall_s = time.perf_counter() - wall
+                result.cpu_s = time.process_time() - cpu
+                gc.unfreeze()
+        except (KeyboardInterrupt, ExternalShutdownException):
+            result.interrupted = True
+        self._settle(result)
+        return result
+
+    def _settle(self, result: FlightResult) -> None:
+        plant = self.plant
+        result.failure = plant.failed
+        flown_ns = plant.stamp_ns - self.mission.epoch_ns if plant.begun else -self.mission.period_ns
+        result.steps = flown_ns // self.mission.period_ns + 1
+        result.simulated_s = result.steps * self.mission.period_ns * 1e-9
+        if self.recorder is not None:
+            self._drain_recorder()
+            self.recorder.close()
+            topics = {f"/{topic}" for topic in self.mission.topics}
+            result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
+        if plant.counters["partners_lost"]:
+            result.notes.append(f"{plant.counters['partners_lost']} partners fell silent")
+
+    def _drain_recorder(self) -> None:
+        # what was published last is still on its way: take until nothing more comes
+        before = -1
+        while before != self.recorder.message_count:
+            before = self.recorder.message_count
+            for _ in range(20):
+                self.executor.spin_once(timeout_sec=0.005)
+
+    def _spin(self, done, progress: Progress | None) -> None:
+        if progress is None:
+            spin_until(self.executor, done, context=self.context)
+            return
+        epoch, plant = self.mission.epoch_ns, self.plant
+        last = time.monotonic()
+
+        def done_with_progress() -> bool:
+            nonlocal last
+            now = time.monotonic()
+            if now - last > _PROGRESS_EVERY:
+                last = now
+                progress((plant.stamp_ns - epoch) * 1e-9)
+            return done()
+
+        spin_until(self.executor, done_with_progress, context=self.context)

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every way to fly a mission gives back, and where its recording goes."""
+
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+
+from css_common.mission import Mission
+
+Progress = Callable[[float], None]
+"""Called now and then with the simulated seconds flown."""
+
+
+@dataclass
+class FlightResult:
+    """A flight that ended, well or not.
+
+    Attributes:
+        mission: what flew.
+        simulated_s: simulated time covered [s].
+        wall_s: wall time of the loop, start-up not counted [s].
+        cpu_s: processor time of all processes over the same time [s].
+        steps: control cycles flown.
+        bag: recording, if any.
+        recorded: messages recorded, by absolute topic name.
+        failure: why the flight ended early; empty on a good end.
+        interrupted: the user asked it to end.
+        notes: what happened that a reader should know (restarts, partners lost).
+    """
+
+    mission: Mission
+    simulated_s: float = 0.0
+    wall_s: float = 0.0
+    cpu_s: float = 0.0
+    steps: int = 0
+    bag: Path | None = None
+    recorded: Mapping[str, int] = field(default_factory=dict)
+    failure: str = ""
+    interrupted: bool = False
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def realtime_factor(self) -> float:
+        """Simulated time over wall time."""
+        return self.simulated_s / self.wall_s if self.wall_s > 0.0 else 0.0
+
+    @property
+    def messages_recorded(self) -> int:
+        """Messages of all topics of the graph in the recording."""
+        return sum(self.recorded.values())
+
+    @property
+    def messages_lost(self) -> int:
+        """Messages that the cycles flown must have produced and the recording lacks."""
+        if self.bag is None:
+            return 0
+        lost = 0
+        for topic, output in self.mission.outputs.items():
+            expected = -(-self.steps // output.divider)
+            lost += max(0, expected - self.recorded.get(f"/{topic}", 0))
+        return lost
+
+
+def default_bag(mission: Mission, folder: Path | None = None) -> Path:
+    """A fresh recording folder `bags/MISSION_case_TIME`, in the project when there is one."""
+    root = folder or Path(os.environ.get("SUNPOINT_HOME", ".")) / "bags"
+    now = datetime.now(UTC).strftime("%Y%m%d_%H%M%S")
+    base = root / f"{mission.name}_{mission.values.mission.case}_{now}"
+    bag, n = base, 1
+    while bag.exists():
+        n += 1
+        bag = base.with_name(f"{base.name}_{n}")
+    return bag

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Command-line options that several commands share, and the frame around every command."""
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+
+from css_common.mission import Mission, load_mission
+from css_common.mission_file import MissionError
+from css_recording.errors import BagError
+
+FAILED = 1
+USAGE = 2
+INTERRUPTED = 130
+
+console = Console(stderr=False, highlight=False)
+errors = Console(stderr=True, highlight=False)
+
+
+def add_mission_options(parser: argparse.ArgumentParser) -> None:
+    """Mission name and what may be changed in it."""
+    parser.add_argument("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
+    parser.add_argument("--case", type=int, metavar="K", help="case number: initial state and noise are drawn for it")
+    parser.add_argument("--seed", type=int, metavar="N", help="key of all random streams")
+    parser.add_argument("--duration", type=float, metavar="S", help="simulated time to fly [s]")
+    parser.add_argument(
+        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
+        help="change one parameter, for instance --set ekf.use_gyro=false; may be repeated",
+    )  # fmt: skip
+
+
+def mission_of(arguments: argparse.Namespace) -> Mission:
+    """The mission that the options describe.
+
+    Raises:
+        MissionError: it is wrong.
+    """
+    overrides = list(arguments.overrides)
+    for key in ("case", "seed", "duration"):
+        value = getattr(arguments, key)
+        if value is not None:
+            overrides.append(f"mission.{key}={value}")
+    return load_mission(arguments.mission, overrides)
+
+
+def add_output_options(parser: argparse.ArgumentParser) -> None:
+    """Where results go and how they are printed."""
+    parser.add_argument("--out", type=Path, metavar="DIR", help="recording folder (default: bags/MISSION_CASE_TIME)")
+    parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
+
+
+def guarded(command: Callable[[], int]) -> int:
+    """Runs a command; what the user got wrong becomes one line and exit code 2, Ctrl-C becomes 130."""
+    try:
+        return command()
+    except (MissionError, BagError) as error:
+        errors.print(f"[red]error:[/red] {error}", soft_wrap=True)
+        return USAGE
+    except KeyboardInterrupt:
+        errors.print("interrupted")
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return FAILED

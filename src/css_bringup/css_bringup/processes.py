@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A mission flown with one process per node, supervised.
+
+A node that dies is restarted and named; a second death of the same node within a limit ends the run with its log.
+The plant is not restarted: the state of the spacecraft died with it.
+"""
+
+import json
+import os
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+
+from css_bringup.flight import FlightResult
+from css_common.mission import Mission
+from css_common.mission_file import MissionError
+
+RECORDER = "recorder"
+_POLL = 0.02
+
+
+@dataclass
+class Child:
+    """One supervised process."""
+
+    name: str
+    command: list[str]
+    log: Path
+    process: subprocess.Popen | None = None
+    stream: IO[bytes] | None = None
+    deaths: list[float] = field(default_factory=list)
+
+    def start(self) -> None:
+        """Starts the process; its output is appended to its log."""
+        self.stream = self.log.open("ab")
+        # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
+        self.process = subprocess.Popen(
+            self.command, stdout=self.stream, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
+        )
+
+    def poll(self) -> int | None:
+        """Exit code, or None while it runs."""
+        return self.process.poll() if self.process else None
+
+    def stop(self, limit: float) -> None:
+        """Asks the process to end, and insists after `limit` seconds."""
+        if self.process is None:
+            return
+        if self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+            try:
+                self.process.wait(limit)
+            except subprocess.TimeoutExpired:
+                self.process.kill()
+                self.process.wait()
+        if self.stream is not None:
+            self.stream.close()
+            self.stream = None
+
+    def log_tail(self, lines: int = 20) -> str:
+        """The end of its log."""
+        text = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
+        return "\n".join(text[-lines:])
+
+
+def executable_path(package: str, executable: str) -> str:
+    """Installed executable of a node, found as `ros2 run` finds it.
+
+    Raises:
+        MissionError: the package or the executable is not installed.
+    """
+    try:
+        path = Path(get_package_prefix(package)) / "lib" / package / executable
+    except PackageNotFoundError as error:
+        raise MissionError(f"package {package} is not installed; build the workspace first") from error
+    if not os.access(path, os.X_OK):
+        raise MissionError(f"{package} has no executable {executable}; build the workspace again")
+    return str(path)
+
+
+class Supervisor:
+    """Starts, watches and stops the processes of a flight."""
+
+    def __init__(self, mission: Mission, bag: Path | None, logs: Path, restart_limit_s: float = 60.0) -> None:
+        """Prepares a flight; `start` begins it.
+
+        Args:
+            mission: what to fly; it must have a plant.
+            bag: where to record; None records nothing.
+            logs: folder for the nodes' logs.
+            restart_limit_s: a node that dies twice within this wall time ends the run.
+
+        Raises:
+            MissionError: an executable is missing.
+        """
+        self.mission = mission
+        self.bag = bag
+        self.logs = logs
+        self.restart_limit_s = restart_limit_s
+        self.notes: list[str] = []
+        self.failure = ""
+        self._folder = tempfile.TemporaryDirectory(prefix="sunpoint_")
+        logs.mkdir(parents=True, exist_ok=True)
+        flown = mission
+        if bag is not None:
+            flown = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
+        self._parameters = Path(self._folder.name) / f"{mission.name}.yaml"
+        self._parameters.write_text(flown.text(), encoding="utf-8")
+        self.children = {node.name: self._child(node.name, node.package, node.executable) for node in flown.nodes}
+        self.recorder = self._recorder() if bag is not None else None
+
+    def _child(self, name: str, package: str, executable: str) -> Child:
+        command = [executable_path(package, executable), "--summary", str(self._summary(name)), "--ros-args"]
+        command += ["--params-file", str(self._parameters), "-r", f"__node:={name}"]
+        return Child(name, command, self.logs / f"{name}.log")
+
+    def _summary(self, name: str) -> Path:
+        return Path(self._folder.name) / f"{name}.summary.json"
+
+    def _recorder(self) -> Child:
+        command = [executable_path("css_recording", RECORDER), "--mission", str(self._parameters)]
+        command += ["--output", str(self.bag), "--summary", str(self._summary(RECORDER))]
+        return Child(RECORDER, command, self.logs / f"{RECORDER}.log")
+
+    @property
+    def plant(self) -> Child:
+        """The process that owns simulated time."""
+        return self.children[self.mission.plant.name]
+
+    def start(self) -> None:
+        """Starts all processes, the plant last."""
+        first = [self.recorder] if self.recorder else []
+        for child in (*first, *(c for c in self.children.values() if c is not self.plant), self.plant):
+            child.start()
+
+    def check(self) -> bool:
+        """Looks after the processes once; False when the flight is over, well or not."""
+        code = self.plant.poll()
+        if code is not None:
+            if code != 0:
+                self._fail(self.plant, code, "the spacecraft's state is lost with it")
+            return False
+        for child in (*self.children.values(), *filter(None, [self.recorder])):
+            code = child.poll()
+            if code is None:
+                continue
+            now = time.monotonic()
+            child.deaths.append(now)
+            if child is self.recorder:
+                self._fail(child, code, "the flight is not recorded any more")
+                return False
+            if len(child.deaths) > 1 and now - child.deaths[-2] < self.restart_limit_s:
+                self._fail(child, code, f"for the second time within {self.restart_limit_s:g} s")
+                return False
+            self.notes.append(f"{child.name} died ({_cause(code)}) and was restarted")
+            child.stop(0.0)
+            child.start()
+        return True
+
+    def stop(self) -> None:
+        """Ends all processes: nodes first, then the recorder, which takes what they published last."""
+        nodes = [c for c in self.children.values() if c.process is not None]
+        for child in nodes:
+            if child.poll() is None:
+                child.process.send_signal(signal.SIGINT)
+        for child in nodes:
+            child.stop(5.0)
+        if self.recorder is not None:
+            self.recorder.stop(30.0)
+
+    def summary(self, name: str) -> dict[str, Any]:
+        """Figures that a process left at its end; empty when it was killed."""
+        file = self._summary(name)
+        return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+
+    def clean(self) -> None:
+        """Removes temporary files."""
+        self._folder.cleanup()
+
+    def _fail(self, child: Child, code: int, consequence: str) -> None:
+        self.failure = f"{child.name} died ({_cause(code)}), {consequence}; its log {child.log} ends:\n{child.log_tail()}"
+
+
+def _cause(code: int) -> str:
+    if code < 0:
+        try:
+            return signal.Signals(-code).name
+        except ValueError:
+            return f"signal {-code}"
+    return f"exit code {code}"
+
+
+def fly_processes(
+    mission: Mission, bag: Path | None, logs: Path, on_poll: Callable[[Supervisor], None] | None = None
+) -> FlightResult:
+    """Flies a mission with one process per node.
+
+    Args:
+        mission: what to fly.
+        bag: where to record; None records nothing.
+        logs: folder for the nodes' logs.
+        on_poll: called between looks at the processes.
+    """
+    result = FlightResult(mission, bag=bag)
+    supervisor = Supervisor(mission, bag, logs)
+    try:
+        supervisor.start()
+        while supervisor.check():
+            if on_poll is not None:
+                on_poll(supervisor)
+            time.sleep(_POLL)
+    except KeyboardInterrupt:
+        result.interrupted = True
+    finally:
+        supervisor.stop()
+    result.failure, result.notes = supervisor.failure, supervisor.notes
+    flown = supervisor.summary(supervisor.plant.name)
+    if flown:
+        result.wall_s = flown["wall_s"]
+        result.steps = flown["counters"].get("cycles", 0)
+        result.simulated_s = result.steps * mission.period_ns * 1e-9
+    result.cpu_s = sum(supervisor.summary(name).get("cpu_s", 0.0) for name in (*supervisor.children, RECORDER))
+    result.recorded = supervisor.summary(RECORDER).get("recorded", {})
+    supervisor.clean()
+    return result

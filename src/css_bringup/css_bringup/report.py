@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The result of a flight or a replay, as a table for people and as JSON for scripts."""
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.console import Console
+
+from css_bringup.flight import FlightResult
+from css_studies.flight_metrics import Run
+from css_studies.flight_summary import criteria_failures, summary_table
+
+
+def result_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
+    """What `--json` prints."""
+    values = result.mission.values.mission
+    return {
+        "mission": result.mission.name,
+        "case": values.case,
+        "seed": values.seed,
+        "simulated_s": round(result.simulated_s, 6),
+        "wall_s": round(result.wall_s, 3),
+        "cpu_s": round(result.cpu_s, 3),
+        "realtime_factor": round(result.realtime_factor, 1),
+        "messages_recorded": result.messages_recorded,
+        "messages_lost": result.messages_lost,
+        "bag": str(result.bag) if result.bag else None,
+        "runs": list(runs),
+    }
+
+
+def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:
+    """The table and the figures of the flight."""
+    console.print(summary_table(runs))
+    console.print(
+        f"{result.simulated_s:.1f} s simulated in {result.wall_s:.1f} s wall, {result.cpu_s:.1f} s CPU: "
+        f"{result.realtime_factor:.0f} times real time"
+    )
+    if result.bag is not None:
+        console.print(
+            f"{result.messages_recorded} messages recorded, {result.messages_lost} lost: {result.bag}", soft_wrap=True
+        )
+    for note in result.notes:
+        console.print(f"note: {note}")
+
+
+def print_json(value: Mapping[str, Any]) -> None:
+    """One JSON object on one line."""
+    print(json.dumps(value, allow_nan=False), flush=True)
+
+
+def unmet(result: FlightResult, runs: Sequence[Run]) -> list[str]:
+    """Pass criteria of the mission that the flown estimator missed."""
+    return criteria_failures(result.mission.criteria, [run for run in runs if run["flown"]])
