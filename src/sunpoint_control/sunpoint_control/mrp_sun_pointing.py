@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: Apache-2.0
+"""MRP feedback that turns the array normal to the Sun (O'Keefe & Schaub 2013, Eqs. 18-20).
+
+The law in its general form (also Hogan & Schaub 2015, Eq. 13), u_s the motor torques, h_s the wheel momenta:
+
+    Gs u_s = -[I](omega_r' - omega x omega_r) + K sigma_br + P domega + P K_I z
+             - ([omega_r x] - [(K_I z) x])([I] omega + Gs h_s) + L
+
+Sun pointing asks for a reference at rest, omega_r = 0, and knows no external torque L. What is left,
+
+    Gs u_s = K sigma_br + P omega + P K_I z + (K_I z) x ([I] omega + Gs h_s),    z = K int(sigma_br) dt +
+    [I] omega,
+
+acts on the body with the opposite sign. The minus inside the bracket is the paper's: only with it do the
+gyroscopic terms leave the Lyapunov function, whose rate is then -(omega + K_I z)^T P (omega + K_I z).
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, choice, real
+from css_common.vectors import Mat3, Vec3, add, cross, dot, mat3, multiply, norm, scale, unit
+
+PARAMETERS: Table = (
+    real("gains.k", 0.148, "N m", "attitude gain K", low=0.0, tunable=True),
+    real("gains.p", 0.9, "N m s", "rate gain P, the same on all axes", low=0.0, tunable=True),
+    real("gains.ki", 1e-4, "1/(kg m^2)", "integral gain K_I", low=0.0, tunable=True),
+    real(
+        "gains.integral_limit", 10.0, "N m s", "bound on each axis of K int(sigma) dt", low=0.0, tunable=True
+    ),
+    real(
+        "deadband_deg",
+        15.0,
+        "deg",
+        "no attitude control while the estimated Sun is closer to the array normal",
+        low=0.0,
+        high=180.0,
+        tunable=True,
+    ),
+    choice(
+        "deadband_behaviour", "zero", ("zero", "damp"), "torque in the deadband: none, or rate damping alone"
+    ),
+)
+
+# Sine of an angle between Sun and array normal at which they no longer span a plane.
+_ALIGNED = 1e-6
+
+
+class PointingParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    k: float
+    p: float
+    ki: float
+    integral_limit: float
+    inertia_b: Mat3  # [kg m^2]
+    array_normal_b: Vec3
+    deadband: float  # [rad]
+    damp_in_deadband: bool
+
+
+def parameters(values: Values) -> PointingParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `spacecraft`)."""
+    x, y, z = (float(c) for c in values.spacecraft.array_normal)
+    return PointingParameters(
+        k=values.gains.k,
+        p=values.gains.p,
+        ki=values.gains.ki,
+        integral_limit=values.gains.integral_limit,
+        inertia_b=mat3(values.spacecraft.inertia),
+        array_normal_b=(x, y, z),
+        deadband=math.radians(values.deadband_deg),
+        damp_in_deadband=values.deadband_behaviour == "damp",
+    )
+
+
+@kernel
+def error_mrp(sun_b: Vec3, array_normal_b: Vec3) -> tuple[Vec3, float]:
+    """Attitude error sigma_br of Eq. 20 and the angle [rad] from array normal to Sun, both unit vectors in b.
+
+    The reference frame r is the body turned the short way until the array normal lies on the Sun, so
+    sigma_br points along sun_b x array_normal_b. With c2 the cosine of the half angle, Eq. 20 is (sun_b x
+    array_normal_b) / (2 c2 (1 + c2)): no singularity at alignment. Opposite vectors leave the axis open; it
+    is then taken normal to the array normal and the x axis, or the y axis if that lies along the array
+    normal.
+    """
+    axis = cross(sun_b, array_normal_b)
+    sine = norm(axis)
+    cosine = dot(sun_b, array_normal_b)
+    angle = math.atan2(sine, cosine)
+    if cosine < 0.0 and sine < _ALIGNED:
+        axis = cross(array_normal_b, (1.0, 0.0, 0.0))
+        if norm(axis) < _ALIGNED:
+            axis = cross(array_normal_b, (0.0, 1.0, 0.0))
+        return scale(math.tan(0.25 * angle), unit(axis)), angle
+    c2 = math.cos(0.5 * angle)
+    return scale(0.5 / (c2 * (1.0 + c2)), axis), angle
+
+
+@kernel
+def pointing_torque(
+    p: PointingParameters, sigma_br: Vec3, omega_bn_b: Vec3, integral: Vec3, wheel_momentum_b: Vec3
+) -> tuple[Vec3, Vec3]:
+    """Torque on the body [N m] that the wheels are to give, and z [N m s].
+
+    Args:
+        sigma_br: attitude error.
+        omega_bn_b: body rate [rad/s].
+        integral: K int(sigma_br) dt [N m s].
+        wheel_momentum_b: Gs h_s [N m s].
+    """
+    body_momentum = multiply(p.inertia_b, omega_bn_b)
+    z = add(integral, body_momentum)
+    kz = scale(p.ki, z)
+    gyroscopic = cross(kz, add(body_momentum, wheel_momentum_b))
+    return (
+        -(p.k * sigma_br[0] + p.p * (omega_bn_b[0] + kz[0]) + gyroscopic[0]),
+        -(p.k * sigma_br[1] + p.p * (omega_bn_b[1] + kz[1]) + gyroscopic[1]),
+        -(p.k * sigma_br[2] + p.p * (omega_bn_b[2] + kz[2]) + gyroscopic[2]),
+    ), z
+
+
+@kernel
+def damping_torque(p: PointingParameters, omega_bn_b: Vec3, omega_rn_b: Vec3) -> Vec3:
+    """Torque on the body [N m] that brings its rate to `omega_rn_b` [rad/s], without regard to attitude."""
+    return (
+        -p.p * (omega_bn_b[0] - omega_rn_b[0]),
+        -p.p * (omega_bn_b[1] - omega_rn_b[1]),
+        -p.p * (omega_bn_b[2] - omega_rn_b[2]),
+    )
+
+
+@kernel
+def integrate_error(p: PointingParameters, integral: Vec3, sigma_br: Vec3, dt: float) -> Vec3:
+    """K int(sigma_br) dt [N m s] after `dt` [s] more, bounded on each axis."""
+    k = p.k * dt
+    limit = p.integral_limit
+    return (
+        min(max(integral[0] + k * sigma_br[0], -limit), limit),
+        min(max(integral[1] + k * sigma_br[1], -limit), limit),
+        min(max(integral[2] + k * sigma_br[2], -limit), limit),
+    )

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One cycle of the Sun-pointing control: mode, torque, allocation to the wheels, momentum dumping.
+
+Whatever the mode, a cycle without information about the body rate asks for no torque: turning blindly does
+more harm than coasting.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, choice
+from css_common.vectors import Vec3, norm
+from sunpoint_control import modes, momentum_dumping, mrp_sun_pointing, wheel_allocation
+from sunpoint_control.modes import (
+    MODE_DETUMBLE,
+    MODE_ECLIPSE,
+    MODE_SAFE,
+    MODE_SUN_SEARCH,
+    ModeParameters,
+    ModeState,
+    next_mode,
+    search_rate,
+)
+from sunpoint_control.momentum_dumping import DumpingParameters, add_dumping
+from sunpoint_control.mrp_sun_pointing import (
+    PointingParameters,
+    damping_torque,
+    error_mrp,
+    integrate_error,
+    pointing_torque,
+)
+from sunpoint_control.wheel_allocation import AllocationParameters, allocate, limit_torques, wheel_momentum
+
+PARAMETERS: Table = (
+    *mrp_sun_pointing.PARAMETERS,
+    choice(
+        "eclipse_behaviour",
+        "rate_damp",
+        ("coast", "rate_damp", "hold_attitude"),
+        "in the shadow: no torque, rate damping, or pointing at the propagated Sun",
+        tunable=True,
+    ),
+    *wheel_allocation.PARAMETERS,
+    *modes.PARAMETERS,
+    *momentum_dumping.PARAMETERS,
+)
+
+# The numbers of css_msgs/SunEstimate.
+_VALIDITY_NONE = 0
+_VALIDITY_VALID = 2
+_RATE_NONE = 0
+
+_ECLIPSE = {"coast": 0, "rate_damp": 1, "hold_attitude": 2}
+_COAST = _ECLIPSE["coast"]
+_HOLD = _ECLIPSE["hold_attitude"]
+
+# Beyond these an input is a fault, not a measurement.
+_LARGEST_DIRECTION = 2.0
+_LARGEST_RATE = 100.0  # [rad/s]
+_LARGEST_SPEED = 1e6  # [rad/s]
+_LARGEST_FIELD = 1.0  # [T]
+
+_ZERO: Vec3 = (0.0, 0.0, 0.0)
+
+
+class ControlParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    pointing: PointingParameters
+    eclipse_behaviour: int
+    wheels: AllocationParameters
+    modes: ModeParameters
+    dumping: DumpingParameters
+
+
+class ControlState(NamedTuple):
+    """Carried from cycle to cycle."""
+
+    integral: Vec3  # [N m s] K int(sigma_br) dt
+    modes: ModeState
+
+
+class ControlOutput(NamedTuple):
+    """What one cycle decided; see css_msgs/ControlStatus."""
+
+    torque_b: Vec3  # [N m] asked of the wheels, on the body
+    integral: Vec3  # [N m s] z of the control law
+    wheel_momentum_b: Vec3  # [N m s]
+    pointing_error: float  # [rad] -1: no Sun known
+    rate: float  # [rad/s]
+    mode: int
+    reason: int
+    deadband: bool
+    dumping: bool
+    wheels_saturated: int  # bit i: wheel i was asked for more than it may give
+    rods_saturated: int  # bit i: rod i was asked for more than it may give
+
+
+def parameters(values: Values) -> ControlParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `spacecraft`, `wheels`, `rods`)."""
+    return ControlParameters(
+        pointing=mrp_sun_pointing.parameters(values),
+        eclipse_behaviour=_ECLIPSE[values.eclipse_behaviour],
+        wheels=wheel_allocation.parameters(values),
+        modes=modes.parameters(values),
+        dumping=momentum_dumping.parameters(values),
+    )
+
+
+def conflicts(values: Values):
+    """What is wrong between parameters, one message each."""
+    yield from modes.conflicts(values)
+    count = len(values.wheels.axes)
+    for index in values.wheels_out:
+        if index >= count:
+            yield f"wheels_out: wheel {index} given, the mission has wheels 0 to {count - 1}"
+    if values.dumping.enabled and not values.rods.fitted:
+        yield "dumping.enabled: true, but rods.fitted says that the spacecraft has no torque rods"
+
+
+def initial_state(p: ControlParameters) -> ControlState:
+    """No error integrated yet, acquiring the Sun."""
+    return ControlState(_ZERO, modes.initial_state())
+
+
+@kernel
+def _within(values, limit: float) -> bool:
+    # a NaN compares false
+    for value in values:  # noqa: SIM110  (a generator expression does not compile)
+        if not abs(value) <= limit:
+            return False
+    return True
+
+
+@kernel
+def step(
+    p: ControlParameters,
+    state: ControlState,
+    dt: float,
+    sun_b: Vec3,
+    validity: int,
+    eclipse: int,
+    omega_bn_b: Vec3,
+    rate_source: int,
+    wheel_speeds,
+    field_b: Vec3,
+    field_valid: bool,
+    torque_out,
+    dipole_out,
+) -> tuple[ControlState, ControlOutput]:
+    """One cycle.
+
+    Args:
+        dt: time since the last cycle [s].
+        sun_b, validity, eclipse, omega_bn_b, rate_source: fields of the Sun estimate.
+        wheel_speeds: (n,) relative to the body [rad/s].
+        field_b, field_valid: magnetic field [T], and whether there is a measurement.
+        torque_out: (n,) motor torques [N m], written.
+        dipole_out: (m,) rod dipoles [A m^2], written; may be empty without rods.
+    """
+    dt = dt if 0.0 < dt < math.inf else 0.0
+    inputs_ok = (
+        _within(sun_b, _LARGEST_DIRECTION)
+        and _within(omega_bn_b, _LARGEST_RATE)
+        and _within(wheel_speeds, _LARGEST_SPEED)
+    )
+    sigma_br = _ZERO
+    error = -1.0
+    rate = 0.0
+    momentum_b = _ZERO
+    if inputs_ok:
+        rate = norm(omega_bn_b)
+        momentum_b = wheel_momentum(p.wheels.axes_b, p.dumping.wheel_inertia, wheel_speeds, omega_bn_b)
+        if validity != _VALIDITY_NONE:
+            sigma_br, error = error_mrp(sun_b, p.pointing.array_normal_b)
+    rate_known = inputs_ok and rate_source != _RATE_NONE
+    mode_state = next_mode(
+        p.modes,
+        state.modes,
+        dt,
+        inputs_ok,
+        inputs_ok and validity == _VALIDITY_VALID,
+        eclipse != 0,
+        error,
+        rate,
+        rate_known,
+    )
+    mode = mode_state.mode
+
+    torque_b = _ZERO
+    z = state.integral
+    deadband = False
+    feedback = False
+    if rate_known and mode != MODE_SAFE:
+        attitude_known = error >= 0.0 and mode != MODE_DETUMBLE and mode != MODE_SUN_SEARCH
+        if mode == MODE_ECLIPSE:
+            attitude_known = attitude_known and p.eclipse_behaviour == _HOLD
+        if attitude_known and error < p.pointing.deadband:
+            deadband = True
+            if p.pointing.damp_in_deadband:
+                torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
+        elif attitude_known:
+            feedback = True
+            torque_b, z = pointing_torque(p.pointing, sigma_br, omega_bn_b, state.integral, momentum_b)
+        elif mode == MODE_SUN_SEARCH:
+            wanted_rate = search_rate(p.modes, mode_state.search_time)
+            torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
+        elif mode != MODE_ECLIPSE or p.eclipse_behaviour != _COAST:
+            torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
+
+    allocate(p.wheels, torque_b, torque_out)
+    wheels_saturated = limit_torques(p.wheels, torque_out)
+    integral = state.integral
+    if feedback and wheels_saturated == 0:
+        # held in the deadband, in the shadow and at a torque limit: what cannot act must not wind up
+        integral = integrate_error(p.pointing, integral, sigma_br, dt)
+
+    rods_saturated = 0
+    dumping = False
+    dipole_out[:] = 0.0
+    if (
+        p.dumping.enabled
+        and field_valid
+        and inputs_ok
+        and mode != MODE_SAFE
+        and _within(field_b, _LARGEST_FIELD)
+    ):
+        rods_saturated, dumping = add_dumping(
+            p.dumping, p.wheels, wheel_speeds, field_b, torque_out, dipole_out
+        )
+    output = ControlOutput(
+        torque_b,
+        z,
+        momentum_b,
+        error,
+        rate,
+        mode,
+        mode_state.reason,
+        deadband,
+        dumping,
+        wheels_saturated,
+        rods_saturated,
+    )
+    return ControlState(integral, mode_state), output

@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Motor torques of redundant reaction wheels for a wanted body torque.
+
+The minimum-norm solution through the pseudo-inverse of the wheel axes, for any number of wheels. Wheels out
+of service get no torque; should the rest not span all directions, they give the nearest torque they can.
+Beyond the torque limit all motors are scaled together, so that the torque keeps its direction, or each is
+clipped.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, choice, integers
+from css_common.vectors import Vec3, dot, vec3
+
+PARAMETERS: Table = (
+    choice(
+        "wheel_saturation",
+        "scale",
+        ("scale", "clip"),
+        "beyond the torque limit: scale all wheels, or clip each",
+        tunable=True,
+    ),
+    integers("wheels_out", (), "-", "indices of wheels out of service, from 0", low=0, high=31, tunable=True),
+)
+
+
+class AllocationParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    axes_b: np.ndarray  # (n, 3) spin axes
+    inverse: np.ndarray  # (n, 3) pseudo-inverse of Gs; zero rows: out of service
+    max_torque: float  # [N m] of each wheel
+    keep_direction: bool
+
+
+def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
+    """Map (n, 3) from a torque in b to wheel torques of least norm, for (n, 3) axes, by SVD."""
+    axes = np.array(axes_b, dtype=np.float64)
+    axes[list(out_of_service)] = 0.0
+    return np.ascontiguousarray(np.linalg.pinv(axes.T))
+
+
+def parameters(values: Values) -> AllocationParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `wheels`)."""
+    axes_b = np.ascontiguousarray(values.wheels.axes, dtype=np.float64)
+    return AllocationParameters(
+        axes_b=axes_b,
+        inverse=pseudo_inverse(axes_b, values.wheels_out),
+        max_torque=values.wheels.max_torque,
+        keep_direction=values.wheel_saturation == "scale",
+    )
+
+
+@kernel
+def allocate(p: AllocationParameters, torque_b: Vec3, out) -> None:
+    """Writes the motor torques (n,) [N m] with the reaction `torque_b` [N m] on the body, -Gs u."""
+    m = p.inverse
+    for i in range(m.shape[0]):
+        out[i] = -(m[i, 0] * torque_b[0] + m[i, 1] * torque_b[1] + m[i, 2] * torque_b[2])
+
+
+@kernel
+def limit_torques(p: AllocationParameters, torques) -> int:
+    """Brings motor torques (n,) [N m] within the limit, in place; mask of the wheels above it."""
+    limit = p.max_torque
+    mask = 0
+    largest = 0.0
+    for i in range(torques.shape[0]):
+        size = abs(torques[i])
+        largest = max(largest, size)
+        if size > limit:
+            mask |= 1 << i
+    if mask == 0:
+        return mask
+    k = limit / largest
+    for i in range(torques.shape[0]):
+        torques[i] = k * torques[i] if p.keep_direction else min(max(torques[i], -limit), limit)
+    return mask
+
+
+@kernel
+def wheel_momentum(axes_b, wheel_inertia: float, speeds, omega_bn_b: Vec3) -> Vec3:
+    """Gs h_s [N m s], h_i = Js (Omega_i + g_i . omega): momentum of the wheels about their spin axes, in b.
+
+    Args:
+        axes_b: (n, 3) spin axes.
+        wheel_inertia: Js [kg m^2].
+        speeds: (n,) speeds relative to the body [rad/s].
+    """
+    x = y = z = 0.0
+    for i in range(axes_b.shape[0]):
+        g = vec3(axes_b[i])
+        h = wheel_inertia * (speeds[i] + dot(g, omega_bn_b))
+        x += h * g[0]
+        y += h * g[1]
+        z += h * g[2]
+    return (x, y, z)
