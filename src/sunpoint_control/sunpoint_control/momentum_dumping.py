@@ -18,7 +18,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, flag, real
-from css_common.vectors import Vec3, cross, dot, norm, unit, vec3
+from css_common.vectors import Vec3, cross, dot, norm, row, unit
 from sunpoint_control.wheel_allocation import AllocationParameters
 
 PARAMETERS: Table = (
@@ -76,7 +76,7 @@ def rod_dipoles(rod_axes_b, torque_b: Vec3, field_b: Vec3, out) -> None:
     e2 = cross(b, e1)
     m11 = m12 = m22 = 0.0
     for j in range(rod_axes_b.shape[0]):
-        a = cross(vec3(rod_axes_b[j]), field_b)
+        a = cross(row(rod_axes_b, j), field_b)
         a1, a2 = dot(a, e1), dot(a, e2)
         m11 += a1 * a1
         m12 += a1 * a2
@@ -94,7 +94,7 @@ def rod_dipoles(rod_axes_b, torque_b: Vec3, field_b: Vec3, out) -> None:
         w1 = (m11 * t1 + m12 * t2) / (trace * trace)
         w2 = (m12 * t1 + m22 * t2) / (trace * trace)
     for j in range(rod_axes_b.shape[0]):
-        a = cross(vec3(rod_axes_b[j]), field_b)
+        a = cross(row(rod_axes_b, j), field_b)
         out[j] = dot(a, e1) * w1 + dot(a, e2) * w2
 
 
@@ -140,12 +140,12 @@ def add_dumping(
     m = wheels.inverse
     share = 1.0
     for i in range(n):
-        u = _despin_torque(p, wheels, speeds, i) + dot(vec3(m[i]), rest)
+        u = _despin_torque(p, wheels, speeds, i) + dot(row(m, i), rest)
         room = max(wheels.max_torque - (torques[i] if u > 0.0 else -torques[i]), 0.0)
         if abs(u) > room:
             share = min(share, room / abs(u))
     for i in range(n):
-        torques[i] += share * (_despin_torque(p, wheels, speeds, i) + dot(vec3(m[i]), rest))
+        torques[i] += share * (_despin_torque(p, wheels, speeds, i) + dot(row(m, i), rest))
     for j in range(dipoles.shape[0]):
         dipoles[j] *= share
     return mask, share > 0.0

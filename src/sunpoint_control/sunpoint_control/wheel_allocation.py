@@ -13,7 +13,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, choice, integers
-from css_common.vectors import Vec3, dot, vec3
+from css_common.vectors import Vec3, dot, row
 
 PARAMETERS: Table = (
     choice(
@@ -92,7 +92,7 @@ def wheel_momentum(axes_b, wheel_inertia: float, speeds, omega_bn_b: Vec3) -> Ve
     """
     x = y = z = 0.0
     for i in range(axes_b.shape[0]):
-        g = vec3(axes_b[i])
+        g = row(axes_b, i)
         h = wheel_inertia * (speeds[i] + dot(g, omega_bn_b))
         x += h * g[0]
         y += h * g[1]
