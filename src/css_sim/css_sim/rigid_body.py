@@ -15,15 +15,19 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from css_common.attitude import mrp_rate, mrp_shadow
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, row, scale, subtract
+from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, scale, subtract
 
 _RADIANS_PER_RPM = 2.0 * math.pi / 60.0
 # Passes of the speed limit: each shrinks the excess by the ratio of wheel to body inertia.
 _LIMIT_PASSES = 4
+
+
+WHEEL = np.dtype([(name, np.float64) for name in ("gx", "gy", "gz", "inertia", "max_torque", "max_speed")], align=True)
+"""One reaction wheel: unit spin axis in b, spin inertia [kg m2], limits of torque [N m] and speed [rad/s]."""
 
 
 class RigidBody(NamedTuple):
@@ -31,10 +35,7 @@ class RigidBody(NamedTuple):
 
     inertia: Mat3  # [kg m2] in b, without the wheels' inertia along their spin axes
     inertia_inverse: Mat3  # [1/(kg m2)]
-    wheel_axes_b: NDArray[np.float64]  # (N, 3) unit spin axes
-    wheel_inertia: NDArray[np.float64]  # (N,) [kg m2] about the spin axis
-    wheel_max_torque: NDArray[np.float64]  # (N,) [N m]
-    wheel_max_speed: NDArray[np.float64]  # (N,) [rad/s] relative to the body
+    wheels: np.ndarray  # (N,) of WHEEL: one array, because each one in a parameter costs time at every call
     substeps: int  # integration steps per call
 
 
@@ -65,25 +66,17 @@ def rigid_body(
     """
     matrix = np.asarray(inertia, dtype=np.float64).reshape(3, 3)
     axes = np.asarray(wheel_axes, dtype=np.float64).reshape(-1, 3)
-    axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
-    return RigidBody(
-        inertia=_rows(matrix),
-        inertia_inverse=_rows(np.linalg.inv(matrix)),
-        wheel_axes_b=np.ascontiguousarray(axes),
-        wheel_inertia=_per_wheel(wheel_inertia, len(axes)),
-        wheel_max_torque=_per_wheel(wheel_max_torque, len(axes)),
-        wheel_max_speed=_per_wheel(wheel_max_speed_rpm, len(axes)) * _RADIANS_PER_RPM,
-        substeps=int(substeps),
-    )
+    wheels = np.zeros(len(axes), WHEEL)
+    wheels["gx"], wheels["gy"], wheels["gz"] = (axes / np.linalg.norm(axes, axis=1, keepdims=True)).T
+    wheels["inertia"] = wheel_inertia
+    wheels["max_torque"] = wheel_max_torque
+    wheels["max_speed"] = np.asarray(wheel_max_speed_rpm) * _RADIANS_PER_RPM
+    return RigidBody(_rows(matrix), _rows(np.linalg.inv(matrix)), wheels, int(substeps))
 
 
-def _rows(matrix: NDArray[np.float64]) -> Mat3:
+def _rows(matrix: np.ndarray) -> Mat3:
     a, b, c = (tuple(float(x) for x in r) for r in matrix)
     return (a, b, c)
-
-
-def _per_wheel(value: ArrayLike, count: int) -> NDArray[np.float64]:
-    return np.array(np.broadcast_to(np.asarray(value, dtype=np.float64), (count,)))
 
 
 @kernel
@@ -132,26 +125,33 @@ def _runge_kutta(inertia, inverse, sigma, omega, h0_b, motor_b, torque_b, dt):
 
 
 @kernel
-def sum_along_axes(axes_b, components) -> Vec3:
-    """Vector sum in b of (N,) components along (N, 3) axes: wheel momenta, wheel torques, rod dipoles."""
+def sum_along_axes(wheels, components) -> Vec3:
+    """Vector sum in b of (N,) components along the spin axes, such as wheel momenta or motor torques."""
     x, y, z = 0.0, 0.0, 0.0
     for i in range(components.shape[0]):
-        x += components[i] * axes_b[i, 0]
-        y += components[i] * axes_b[i, 1]
-        z += components[i] * axes_b[i, 2]
+        x += components[i] * wheels[i].gx
+        y += components[i] * wheels[i].gy
+        z += components[i] * wheels[i].gz
     return (x, y, z)
 
 
 @kernel
-def wheel_speed(p: RigidBody, omega_bn_b: Vec3, momentum: float, i: int) -> float:
-    """Speed of wheel i relative to the body [rad/s]."""
-    return momentum / p.wheel_inertia[i] - dot(row(p.wheel_axes_b, i), omega_bn_b)
+def wheel_speed(wheel, omega_bn_b: Vec3, momentum: float) -> float:
+    """Speed [rad/s] relative to the body of a wheel with a momentum [N m s]."""
+    return momentum / wheel.inertia - dot((wheel.gx, wheel.gy, wheel.gz), omega_bn_b)
 
 
 @kernel
-def wheel_momentum_at_speed(p: RigidBody, omega_bn_b: Vec3, speed: float, i: int) -> float:
-    """Momentum of wheel i [N m s] that turns at `speed` [rad/s] relative to the body."""
-    return p.wheel_inertia[i] * (speed + dot(row(p.wheel_axes_b, i), omega_bn_b))
+def wheel_momentum_at_speed(wheel, omega_bn_b: Vec3, speed: float) -> float:
+    """Momentum [N m s] of a wheel that turns at `speed` [rad/s] relative to the body."""
+    return wheel.inertia * (speed + dot((wheel.gx, wheel.gy, wheel.gz), omega_bn_b))
+
+
+@kernel
+def wheel_speeds(p: RigidBody, omega_bn_b: Vec3, wheel_momentum, speeds_out) -> None:
+    """Speeds of all wheels relative to the body [rad/s], written to `speeds_out`."""
+    for i in range(wheel_momentum.shape[0]):
+        speeds_out[i] = wheel_speed(p.wheels[i], omega_bn_b, wheel_momentum[i])
 
 
 @kernel
@@ -166,11 +166,11 @@ def _integrate(p, state, h_b, motor_b, external_torque_b, dt):
 
 
 @kernel
-def _limit_torques(max_torque, command, torque_out) -> int:
+def _limit_torques(wheels, command, torque_out) -> int:
     """Commands cut to the wheels' torque limits; mask of those cut."""
     mask = 0
     for i in range(command.shape[0]):
-        limit = max_torque[i]
+        limit = wheels[i].max_torque
         torque = command[i]
         if not abs(torque) <= limit:  # also catches a command that is not a number: no torque
             torque = limit if torque > limit else (-limit if torque < -limit else 0.0)
@@ -180,11 +180,11 @@ def _limit_torques(max_torque, command, torque_out) -> int:
 
 
 @kernel
-def _near_speed_limit(p, omega, wheel_momentum, torque, dt) -> bool:
+def _near_speed_limit(wheels, omega, wheel_momentum, torque, dt) -> bool:
     """True when some wheel may pass its limit; cheap, because it bounds g.w instead of computing it."""
     body = abs(omega[0]) + abs(omega[1]) + abs(omega[2])
     for i in range(torque.shape[0]):
-        if abs(wheel_momentum[i] + dt * torque[i]) > p.wheel_inertia[i] * (p.wheel_max_speed[i] - body):
+        if abs(wheel_momentum[i] + dt * torque[i]) > wheels[i].inertia * (wheels[i].max_speed - body):
             return True
     return False
 
@@ -194,15 +194,15 @@ def _cut_at_speed_limit(p, omega, wheel_momentum, torque, dt) -> int:
     """Cut the torque of wheels that pass their speed limit at the end of the step; mask of those wheels."""
     mask = 0
     for i in range(torque.shape[0]):
-        limit = p.wheel_max_speed[i]
-        speed = wheel_speed(p, omega, wheel_momentum[i] + dt * torque[i], i)
-        excess = speed - min(max(speed, -limit), limit)
+        wheel = p.wheels[i]
+        speed = wheel_speed(wheel, omega, wheel_momentum[i] + dt * torque[i])
+        excess = speed - min(max(speed, -wheel.max_speed), wheel.max_speed)
         # a tolerance of rounding only: a wheel held at its limit must not be cut again and again
-        if abs(excess) > 1e-12 * limit:
-            axis = row(p.wheel_axes_b, i)
-            gain = dt * (1.0 / p.wheel_inertia[i] + dot(axis, multiply(p.inertia_inverse, axis)))
+        if abs(excess) > 1e-12 * wheel.max_speed:
+            axis = (wheel.gx, wheel.gy, wheel.gz)
+            gain = dt * (1.0 / wheel.inertia + dot(axis, multiply(p.inertia_inverse, axis)))
             cut = torque[i] - excess / gain
-            torque[i] = min(max(cut, -p.wheel_max_torque[i]), p.wheel_max_torque[i])
+            torque[i] = min(max(cut, -wheel.max_torque), wheel.max_torque)
             mask |= 1 << i
     return mask
 
@@ -231,18 +231,18 @@ def propagate(
     Returns:
         Rotation state (|sigma_bn| <= 1), mask of torque-limited wheels, mask of speed-limited wheels.
     """
-    torque_limited = _limit_torques(p.wheel_max_torque, wheel_command, wheel_torque_out)
-    h_b = sum_along_axes(p.wheel_axes_b, wheel_momentum)
-    motor_b = sum_along_axes(p.wheel_axes_b, wheel_torque_out)
+    torque_limited = _limit_torques(p.wheels, wheel_command, wheel_torque_out)
+    h_b = sum_along_axes(p.wheels, wheel_momentum)
+    motor_b = sum_along_axes(p.wheels, wheel_torque_out)
     end = _integrate(p, state, h_b, motor_b, external_torque_b, dt)
     speed_limited = 0
-    if _near_speed_limit(p, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt):
+    if _near_speed_limit(p.wheels, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt):
         for _ in range(_LIMIT_PASSES):
             cut = _cut_at_speed_limit(p, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt)
             if cut == 0:
                 break
             speed_limited |= cut
-            motor_b = sum_along_axes(p.wheel_axes_b, wheel_torque_out)
+            motor_b = sum_along_axes(p.wheels, wheel_torque_out)
             end = _integrate(p, state, h_b, motor_b, external_torque_b, dt)
     for i in range(wheel_momentum.shape[0]):
         wheel_momentum[i] += dt * wheel_torque_out[i]

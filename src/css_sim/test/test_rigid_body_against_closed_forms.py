@@ -24,6 +24,11 @@ FREE_BODY = rigid_body(INERTIA)
 OFF_DIAGONAL = np.array([[10.5, 0.7, -0.4], [0.7, 8.0, 0.3], [-0.4, 0.3, 6.75]])
 
 
+def axes_of(p):
+    """[Gs], the spin axes as columns."""
+    return np.array([p.wheels["gx"], p.wheels["gy"], p.wheels["gz"]])
+
+
 def fly(p, state, momentum, command, torque, dt, steps):
     """State after `steps` steps under constant torques; momentum is advanced in place."""
     applied = np.zeros(len(momentum))
@@ -34,13 +39,13 @@ def fly(p, state, momentum, command, torque, dt, steps):
 
 def momentum_n(p, state, momentum):
     """Angular momentum of body and wheels in the inertial frame."""
-    h_b = np.array(p.inertia) @ state.omega_bn_b + p.wheel_axes_b.T @ momentum
+    h_b = np.array(p.inertia) @ state.omega_bn_b + axes_of(p) @ momentum
     return np.array(mrp_to_dcm(state.sigma_bn)).T @ h_b
 
 
 def kinetic_energy(p, state, momentum):
     omega = np.array(state.omega_bn_b)
-    return 0.5 * omega @ np.array(p.inertia) @ omega + 0.5 * np.sum(momentum**2 / p.wheel_inertia)
+    return 0.5 * omega @ np.array(p.inertia) @ omega + 0.5 * np.sum(momentum**2 / p.wheels["inertia"])
 
 
 def cross_matrix(v):
@@ -49,7 +54,7 @@ def cross_matrix(v):
 
 def exact_motion(p, state, momentum, command, torque, duration):
     """The same equations written with matrices and integrated by scipy's DOP853, no shadow switch."""
-    inertia, axes = np.array(p.inertia), p.wheel_axes_b.T
+    inertia, axes = np.array(p.inertia), axes_of(p)
 
     def derivative(_, x):
         s, w, h = x[:3], x[3:6], x[6:]
@@ -80,9 +85,9 @@ def test_wheel_torque_alone_keeps_inertial_momentum_and_feeds_energy():
     energy, work, applied = kinetic_energy(PLANT, state, momentum), 0.0, np.zeros(4)
     start_energy = energy
     for _ in range(100):
-        before = [wheel_speed(PLANT, state.omega_bn_b, momentum[i], i) for i in range(4)]
+        before = [wheel_speed(PLANT.wheels[i], state.omega_bn_b, momentum[i]) for i in range(4)]
         state, _, _ = propagate(PLANT, state, momentum, command, ZERO, 0.1, applied)
-        after = [wheel_speed(PLANT, state.omega_bn_b, momentum[i], i) for i in range(4)]
+        after = [wheel_speed(PLANT.wheels[i], state.omega_bn_b, momentum[i]) for i in range(4)]
         # motor power is torque times relative speed; the trapezium is exact to the curvature of the speed
         work += 0.1 * command @ (0.5 * (np.array(before) + after))
     np.testing.assert_allclose(momentum_n(PLANT, state, momentum), h_start, atol=1e-12)
@@ -130,7 +135,7 @@ def test_motor_torque_turns_body_against_wheel():
     p = rigid_body(INERTIA, [0, 0, 1])
     state = fly(p, AT_REST, momentum, np.array([0.02]), ZERO, 0.1, 50)
     assert state.omega_bn_b[2] == pytest.approx(-0.02 * 5.0 / 6.75, rel=1e-12)
-    assert wheel_speed(p, state.omega_bn_b, momentum[0], 0) == pytest.approx(
+    assert wheel_speed(p.wheels[0], state.omega_bn_b, momentum[0]) == pytest.approx(
         0.02 * 5.0 * (1 / 0.001 + 1 / 6.75), rel=1e-12
     )
 
@@ -180,16 +185,16 @@ def test_torque_beyond_the_limit_is_cut_and_flagged():
 
 def test_wheel_stops_exactly_at_its_speed_limit_and_leaves_it_freely():
     state = RotationState(ZERO, (0.01, 0.0, 0.0))
-    limit = PLANT.wheel_max_speed[0]
-    momentum = np.array([wheel_momentum_at_speed(PLANT, state.omega_bn_b, limit - 1.0, 0), 0, 0, 0])
+    limit = PLANT.wheels["max_speed"][0]
+    momentum = np.array([wheel_momentum_at_speed(PLANT.wheels[0], state.omega_bn_b, limit - 1.0), 0, 0, 0])
     applied = np.zeros(4)
     state, _, limited = propagate(PLANT, state, momentum, np.array([0.03, 0, 0, 0]), ZERO, 0.1, applied)
     assert limited == 1
     assert 0 < applied[0] < 0.03
-    assert wheel_speed(PLANT, state.omega_bn_b, momentum[0], 0) == pytest.approx(limit, rel=1e-11)
+    assert wheel_speed(PLANT.wheels[0], state.omega_bn_b, momentum[0]) == pytest.approx(limit, rel=1e-11)
     state, _, limited = propagate(PLANT, state, momentum, np.array([-0.03, 0, 0, 0]), ZERO, 0.1, applied)
     assert limited == 0 and applied[0] == -0.03
-    assert wheel_speed(PLANT, state.omega_bn_b, momentum[0], 0) < limit - 2.0
+    assert wheel_speed(PLANT.wheels[0], state.omega_bn_b, momentum[0]) < limit - 2.0
 
 
 bounded = st.floats(-1.0, 1.0)
@@ -201,10 +206,9 @@ quadruple = st.tuples(bounded, bounded, bounded, bounded)
 @given(triple, triple, quadruple, quadruple, triple)
 def test_invariants_hold_for_any_start_and_command(sigma, omega, speeds, command, torque):
     p = PLANT
+    limits = p.wheels["max_speed"]
     omega = tuple(0.2 * w for w in omega)
-    momentum = np.array(
-        [wheel_momentum_at_speed(p, omega, s * p.wheel_max_speed[i], i) for i, s in enumerate(speeds)]
-    )
+    momentum = np.array([wheel_momentum_at_speed(p.wheels[i], omega, s * limits[i]) for i, s in enumerate(speeds)])
     before = momentum.copy()
     state = RotationState(sigma, omega)
     applied = np.zeros(4)
@@ -214,11 +218,11 @@ def test_invariants_hold_for_any_start_and_command(sigma, omega, speeds, command
     assert np.linalg.norm(end.sigma_bn) <= 1.0 + 1e-12
     assert np.all(np.abs(applied) <= 0.030)
     np.testing.assert_allclose(momentum - before, 0.1 * applied, atol=1e-15)
-    speed = [wheel_speed(p, end.omega_bn_b, momentum[i], i) for i in range(4)]
-    assert np.all(np.abs(speed) <= p.wheel_max_speed * (1 + 1e-9))
+    speed = [wheel_speed(p.wheels[i], end.omega_bn_b, momentum[i]) for i in range(4)]
+    assert np.all(np.abs(speed) <= limits * (1 + 1e-9))
     assert torque_limited == sum(1 << i for i, u in enumerate(command) if abs(0.06 * u) > 0.030)
     for i in range(4):
         if speed_limited >> i & 1:
             # cutting one wheel after another moves the first again by the ratio of wheel to body inertia
             slack = 0.1 * 2 * 0.030 / 6.75
-            assert p.wheel_max_speed[i] - slack <= abs(speed[i])
+            assert limits[i] - slack <= abs(speed[i])

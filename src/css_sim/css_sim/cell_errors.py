@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors that differ from cell to cell and last for a flight: scale, offset, misalignment.
+
+The table of cells is one record array, because kernels pay for every array that a parameter holds.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.attitude import rotation_vector_to_dcm
+from css_common.kernel import kernel
+from css_common.random_streams import RandomKey, Stream, normal4, normal_quantile, uniform4
+from css_common.schema import Table, Values, real
+from css_common.vectors import Vec3, add, cross, multiply_transposed, scale, unit
+
+PARAMETERS: Table = (
+    real("fixed_degradation", 0.0, "-", "largest lasting loss of a cell, uniform", low=0.0, high=1.0),
+    real("scale_common_error", 0.0, "-", "1 sigma of the scale error of all cells", low=0.0, high=1.0),
+    real("scale_cell_error", 0.0, "-", "1 sigma of the scale error of each cell", low=0.0, high=1.0),
+    real("misalignment_deg", 0.0, "deg", "1 sigma of the tilt of each normal, per axis", low=0.0, high=45.0),
+    real("bias", 0.0, "-", "1 sigma of the constant offset of each cell", low=0.0, high=1.0),
+)
+
+CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "bias")], align=True)
+"""One cell: true outward unit normal in b; `side`, the component of its nominal normal along the normal of the
+body plane that clips its view (0: not clipped); gain [-] and offset [-] of its output."""
+
+# A normal this close to the body plane lies in it: rounding must not hide half of such a cell's view.
+_IN_PLANE = 1e-9
+
+
+class CellErrorModel(NamedTuple):
+    """Statistics of the errors."""
+
+    fixed_degradation: float  # [-] uniform from 0 to this
+    scale_common_error: float  # [-] 1 sigma
+    scale_cell_error: float  # [-] 1 sigma
+    misalignment: float  # [rad] 1 sigma about each of two axes across the normal
+    bias: float  # [-] 1 sigma
+
+
+def error_model(values: Values) -> CellErrorModel:
+    """Statistics from checked values (`PARAMETERS`)."""
+    return CellErrorModel(
+        fixed_degradation=values.fixed_degradation,
+        scale_common_error=values.scale_common_error,
+        scale_cell_error=values.scale_cell_error,
+        misalignment=math.radians(values.misalignment_deg),
+        bias=values.bias,
+    )
+
+
+def nominal_cells(normals_b: np.ndarray, clip_normal_b: np.ndarray) -> np.ndarray:
+    """Array (N,) of CELL without errors.
+
+    Args:
+        normals_b: (N, 3) outward unit normals.
+        clip_normal_b: (3,) normal of the body plane that hides the other half space from each cell; or zeros.
+    """
+    cells = np.zeros(len(normals_b), CELL)
+    cells["nx"], cells["ny"], cells["nz"] = np.asarray(normals_b, dtype=np.float64).T
+    side = normals_b @ np.asarray(clip_normal_b, dtype=np.float64)
+    cells["side"] = np.where(np.abs(side) < _IN_PLANE, 0.0, side)
+    cells["gain"] = 1.0
+    return cells
+
+
+@kernel
+def tilted(normal_b: Vec3, a: float, b: float) -> Vec3:
+    """Unit vector after one rotation whose vector has parts a and b [rad] along two axes across `normal_b`."""
+    # the body axis farthest from the normal gives a safe cross product
+    x, y, z = abs(normal_b[0]), abs(normal_b[1]), abs(normal_b[2])
+    if x <= y and x <= z:
+        helper = (1.0, 0.0, 0.0)
+    elif y <= z:
+        helper = (0.0, 1.0, 0.0)
+    else:
+        helper = (0.0, 0.0, 1.0)
+    e1 = unit(cross(helper, normal_b))
+    e2 = cross(normal_b, e1)
+    turn = rotation_vector_to_dcm(add(scale(a, e1), scale(b, e2)))
+    return multiply_transposed(turn, normal_b)
+
+
+@kernel
+def draw_cells(p: CellErrorModel, key: RandomKey, nominal, cells_out) -> None:
+    """Draw the cells of one case into `cells_out` from the `nominal` ones, both (N,) of CELL."""
+    common = 1.0 + p.scale_common_error * normal4(key, Stream.CELL_SCALE, 1, 0)[0]
+    for i in range(nominal.shape[0]):
+        cell = nominal[i]
+        u = uniform4(key, Stream.CELL_SCALE, 0, i)
+        gain = common * (1.0 + p.scale_cell_error * normal_quantile(u[0])) * (1.0 - p.fixed_degradation * u[1])
+        tilt = normal4(key, Stream.CELL_MISALIGNMENT, 0, i)
+        n = (cell.nx, cell.ny, cell.nz)
+        if p.misalignment > 0.0:
+            n = tilted(n, p.misalignment * tilt[0], p.misalignment * tilt[1])
+        drawn = cells_out[i]
+        drawn.nx, drawn.ny, drawn.nz = n
+        drawn.side = cell.side
+        drawn.gain = cell.gain * max(0.0, gain)
+        drawn.bias = cell.bias + p.bias * normal_quantile(u[2])

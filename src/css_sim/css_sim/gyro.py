@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Three-axis rate gyro: constant bias, white noise, and the errors a real one has besides.
+
+O'Keefe & Schaub 2013 give the constant bias (1 deg/h) and the white noise (0.01 deg/s per sample); the walk of the
+bias, scale, misalignment, range and resolution are zero or absent unless asked for.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.random_streams import RandomKey, Stream, normal4
+from css_common.schema import Table, Values, real
+from css_common.vectors import Mat3, Vec3, multiply
+from css_sim.random_walk import random_walk
+
+PARAMETERS: Table = (
+    real("bias_deg_h", 1.0, "deg/h", "1 sigma of the constant bias, per axis", low=0.0, high=1e6),
+    real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3),
+    real("bias_walk_deg_s", 0.0, "deg/s", "1 sigma of the change of bias from step to step", low=0.0, high=1.0),
+    real("scale_error", 0.0, "-", "1 sigma of the scale error, per axis", low=0.0, high=1.0),
+    real("misalignment_deg", 0.0, "deg", "1 sigma of each angle between axes", low=0.0, high=10.0),
+    real("range_deg_s", 0.0, "deg/s", "largest rate it can read; 0: any", low=0.0, high=1e6),
+    real("resolution_deg_s", 0.0, "deg/s", "step of its output; 0: continuous", low=0.0, high=1e3),
+)
+
+_RADIANS_PER_SECOND = math.pi / 180.0 / 3600.0
+
+
+class Gyro(NamedTuple):
+    """Statistics and limits; rates in rad/s."""
+
+    bias: float
+    noise: float
+    bias_walk: float
+    scale_error: float
+    misalignment: float  # [rad]
+    range: float
+    resolution: float
+
+
+class GyroErrors(NamedTuple):
+    """Errors of one case."""
+
+    bias_b: Vec3  # [rad/s] at step 0
+    response: Mat3  # what the axes make of the body rate
+
+
+def parameters(values: Values) -> Gyro:
+    """Parameters from checked values (`PARAMETERS`)."""
+    return Gyro(
+        bias=values.bias_deg_h * _RADIANS_PER_SECOND,
+        noise=math.radians(values.noise_deg_s),
+        bias_walk=math.radians(values.bias_walk_deg_s),
+        scale_error=values.scale_error,
+        misalignment=math.radians(values.misalignment_deg),
+        range=math.radians(values.range_deg_s),
+        resolution=math.radians(values.resolution_deg_s),
+    )
+
+
+@kernel
+def draw_errors(p: Gyro, key: RandomKey) -> GyroErrors:
+    """Errors of one case: bias, scale and misalignment."""
+    b = normal4(key, Stream.GYRO_BIAS, 0, 0)
+    s = normal4(key, Stream.GYRO_BIAS, 0, 1)
+    m = normal4(key, Stream.GYRO_BIAS, 0, 2)
+    o = normal4(key, Stream.GYRO_BIAS, 0, 3)
+    d, t = p.scale_error, p.misalignment
+    response = (
+        (1.0 + d * s[0], t * m[0], t * m[1]),
+        (t * m[2], 1.0 + d * s[1], t * m[3]),
+        (t * o[0], t * o[1], 1.0 + d * s[2]),
+    )
+    return GyroErrors((p.bias * b[0], p.bias * b[1], p.bias * b[2]), response)
+
+
+@kernel
+def bias_at(p: Gyro, errors: GyroErrors, key: RandomKey, step: int) -> Vec3:
+    """Bias at a control cycle [rad/s]."""
+    b = errors.bias_b
+    if p.bias_walk <= 0.0:
+        return b
+    walk = random_walk(key, Stream.GYRO_BIAS, 4, step)
+    return (b[0] + p.bias_walk * walk[0], b[1] + p.bias_walk * walk[1], b[2] + p.bias_walk * walk[2])
+
+
+@kernel
+def _read_out(p: Gyro, rate: float) -> float:
+    if p.resolution > 0.0:
+        rate = p.resolution * math.floor(rate / p.resolution + 0.5)
+    if p.range > 0.0:
+        rate = min(max(rate, -p.range), p.range)
+    return rate
+
+
+@kernel
+def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle."""
+    w = multiply(errors.response, omega_bn_b)
+    b = bias_at(p, errors, key, step)
+    x, y, z = w[0] + b[0], w[1] + b[1], w[2] + b[2]
+    if p.noise > 0.0:
+        n = normal4(key, Stream.GYRO_NOISE, step, 0)
+        x += p.noise * n[0]
+        y += p.noise * n[1]
+        z += p.noise * n[2]
+    return (_read_out(p, x), _read_out(p, y), _read_out(p, z))
+
+
+def variance(p: Gyro) -> float:
+    """Variance of a reading about the true rate [rad^2/s^2], per axis: noise, initial bias and rounding."""
+    return p.noise**2 + p.bias**2 + p.resolution**2 / 12.0

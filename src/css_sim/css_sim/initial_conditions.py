@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude, rate and wheel speeds at the epoch, and dispersed mass properties, of any case.
+
+O'Keefe & Schaub 2013: attitude uniform over all attitudes, each rate uniform up to 2 deg/s; wheels at rest.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.attitude import mrp_shadow, quaternion_to_mrp
+from css_common.kernel import kernel
+from css_common.random_streams import RandomKey, Stream, normal4, uniform4
+from css_common.schema import Table, Values, choice, real, reals
+from css_common.vectors import Vec3
+from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momentum_at_speed
+
+PARAMETERS: Table = (
+    choice("initial.attitude", "random", ("random", "fixed"), "uniform over all attitudes, or initial.sigma_bn"),
+    reals("initial.sigma_bn", (0.0, 0.0, 0.0), "-", "MRP of the fixed attitude, b relative to n", length=3),
+    choice("initial.rate", "random", ("random", "fixed"), "uniform per axis, or initial.omega_deg_s"),
+    real("initial.max_rate_deg_s", 2.0, "deg/s", "bound of the random rate, per axis", low=0.0, high=3600.0),
+    reals("initial.omega_deg_s", (0.0, 0.0, 0.0), "deg/s", "fixed body rate", length=3),
+    reals("initial.wheel_speed_rpm", (), "rpm", "wheel speeds relative to the body; empty: at rest"),
+    real("dispersion.inertia", 0.0, "-", "1 sigma of each principal moment, relative", low=0.0, high=0.2),
+    real("dispersion.wheel_torque", 0.0, "-", "1 sigma of each wheel's torque limit, relative", low=0.0, high=0.5),
+)
+
+_RADIANS_PER_RPM = 2.0 * math.pi / 60.0
+
+
+class InitialConditions(NamedTuple):
+    """How a case begins."""
+
+    random_attitude: bool
+    random_rate: bool
+    sigma_bn: Vec3
+    omega_bn_b: Vec3  # [rad/s]
+    max_rate: float  # [rad/s]
+
+
+def parameters(values: Values) -> InitialConditions:
+    """Initial conditions from checked values (`PARAMETERS`)."""
+    s1, s2, s3 = (float(s) for s in values.initial.sigma_bn)
+    w1, w2, w3 = (math.radians(w) for w in values.initial.omega_deg_s)
+    return InitialConditions(
+        random_attitude=values.initial.attitude == "random",
+        random_rate=values.initial.rate == "random",
+        sigma_bn=(s1, s2, s3),
+        omega_bn_b=(w1, w2, w3),
+        max_rate=math.radians(values.initial.max_rate_deg_s),
+    )
+
+
+@kernel
+def random_attitude(key: RandomKey) -> Vec3:
+    """MRP of an attitude uniform over all attitudes (Shoemake, Graphics Gems III, 1992)."""
+    u = uniform4(key, Stream.INITIAL_ATTITUDE, 0, 0)
+    a, b = math.sqrt(1.0 - u[0]), math.sqrt(u[0])
+    p, q = 2.0 * math.pi * u[1], 2.0 * math.pi * u[2]
+    return quaternion_to_mrp((a * math.sin(p), a * math.cos(p), b * math.sin(q), b * math.cos(q)))
+
+
+@kernel
+def random_rate(key: RandomKey, max_rate: float) -> Vec3:
+    """Body rate with each component uniform between -max_rate and max_rate [rad/s]."""
+    u = uniform4(key, Stream.INITIAL_RATE, 0, 0)
+    return (max_rate * (2.0 * u[0] - 1.0), max_rate * (2.0 * u[1] - 1.0), max_rate * (2.0 * u[2] - 1.0))
+
+
+@kernel
+def initial_state(p: InitialConditions, key: RandomKey) -> RotationState:
+    """Attitude and rate at the epoch of one case."""
+    sigma_bn = random_attitude(key) if p.random_attitude else mrp_shadow(p.sigma_bn)
+    omega_bn_b = random_rate(key, p.max_rate) if p.random_rate else p.omega_bn_b
+    return RotationState(sigma_bn, omega_bn_b)
+
+
+def initial_wheel_momentum(body: RigidBody, omega_bn_b: Vec3, wheel_speed_rpm) -> np.ndarray:
+    """Wheel momenta (N,) [N m s] for speeds relative to the body [rev/min]; none given: at rest."""
+    speeds = np.broadcast_to(np.asarray(wheel_speed_rpm if len(wheel_speed_rpm) else 0.0), len(body.wheels))
+    return np.array(
+        [
+            wheel_momentum_at_speed(wheel, omega_bn_b, float(speed) * _RADIANS_PER_RPM)
+            for wheel, speed in zip(body.wheels, speeds, strict=True)
+        ],
+        dtype=np.float64,
+    )
+
+
+def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBody:
+    """The spacecraft of one case: mission values, dispersed as `PARAMETERS` ask.
+
+    Principal moments are scaled, axes stay; scaled moments that no rigid body has (triangle inequality) are
+    brought back to the nearest that one has.
+    """
+    inertia = np.asarray(values.spacecraft.inertia, dtype=np.float64)
+    torque = np.full(len(values.wheels.axes), values.wheels.max_torque)
+    if values.dispersion.inertia > 0.0:
+        moments, axes = np.linalg.eigh(inertia)
+        draws = np.array(normal4(key, Stream.INERTIA, 0, 0)[:3])
+        moments = moments * np.clip(1.0 + values.dispersion.inertia * draws, 0.1, None)
+        largest = int(np.argmax(moments))
+        moments[largest] = min(moments[largest], np.sum(np.delete(moments, largest)))
+        inertia = (axes * moments) @ axes.T
+    if values.dispersion.wheel_torque > 0.0:
+        draws = np.array([normal4(key, Stream.WHEEL_LIMIT, 0, i)[0] for i in range(len(torque))])
+        torque = torque * np.clip(1.0 + values.dispersion.wheel_torque * draws, 0.0, None)
+    return rigid_body(inertia, values.wheels.axes, values.wheels.inertia, torque, values.wheels.max_speed_rpm, substeps)

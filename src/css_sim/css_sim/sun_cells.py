@@ -1,0 +1,176 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Signal chain of cosine-type coarse sun sensor cells (O'Keefe & Schaub 2013, Eqs. 1 and 16).
+
+For each cell, in this order:
+
+    V  = f max(0, n.s)       if the Sun is in the cone of view and on the cell's side of the body plane
+    V += albedo              light reflected by the Earth, computed elsewhere
+    V  = 0                   if V is below the drop-out level
+    V *= 1 + b^2/2 - 0.65 b^4     warp, with b = sin(arccos(V clipped to [0, 1]))
+    V *= 1 - d               degradation, d uniform in [0, d_max), common to all cells or one per cell
+    V  = gain V + bias + noise    errors of the individual cell
+    faults                   dead, stuck, noisy
+    limits and quantisation  [low, high] in 2**bits levels
+
+f is the solar flux relative to 1 AU times the visible fraction of the solar disc, n the true normal of the
+cell, s the Sun in the body frame. Outputs are normalised: 1.0 is the Sun at normal incidence at 1 AU.
+"""
+
+import dataclasses
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.random_streams import RandomKey, Stream, normal4, uniform4
+from css_common.schema import Table, Values, choice, flag, integer, real, texts
+from css_common.vectors import Vec3
+from css_sim.cell_faults import FORM, apply_faults, cell_faults
+
+PARAMETERS: Table = (
+    flag("warp", True, "flattened response of O'Keefe & Schaub 2013, Eq. 16"),
+    real("degradation", 0.05, "-", "largest loss of output, drawn anew every step", low=0.0, high=1.0),
+    choice("degradation_mode", "common", ("common", "per_cell"), "one draw for all cells, or one for each"),
+    real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0),
+    real("dropout", 0.0, "-", "light below this level gives no output", low=0.0, high=1.0),
+    real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0),
+    real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0),
+    integer("bits", 0, "-", "resolution between lowest and highest output; 0: continuous", low=0, high=32),
+    dataclasses.replace(texts("faults", (), f"failed cells, each {FORM}; times in s"), tunable=True),
+)
+
+
+class SunCells(NamedTuple):
+    """What all cells have in common; what differs from cell to cell is in `cell_errors.CELL`."""
+
+    clip_normal_b: Vec3  # [-] normal of the body plane that hides the other half space; zeros: none
+    cos_half_view: float
+    warp: bool
+    degradation: float
+    degradation_per_cell: bool
+    noise: float
+    dropout: float
+    output_low: float
+    output_high: float
+    levels: float  # steps between lowest and highest output; 0: continuous
+    faults: np.ndarray  # (F,) of cell_faults.FAULT
+
+
+def parameters(values: Values) -> SunCells:
+    """Parameters of `sample` from checked values (`PARAMETERS`, the mission and its cells)."""
+    x, y, z = (float(c) for c in values.cells.clip_normal)
+    return SunCells(
+        clip_normal_b=(x, y, z),
+        cos_half_view=math.cos(math.radians(0.5 * values.cells.field_of_view_deg)),
+        warp=values.warp,
+        degradation=values.degradation,
+        degradation_per_cell=values.degradation_mode == "per_cell",
+        noise=values.noise,
+        dropout=values.dropout,
+        output_low=values.output_low,
+        output_high=values.output_high,
+        levels=float(2**values.bits) if values.bits else 0.0,
+        faults=cell_faults(values.faults, values.mission.period),
+    )
+
+
+@kernel
+def warped(v: float) -> float:
+    """Response with a flattened peak (O'Keefe & Schaub 2013, Eq. 16)."""
+    clipped = min(max(v, 0.0), 1.0)
+    b2 = 1.0 - clipped * clipped
+    return v * (1.0 + b2 * (0.5 - 0.65 * b2))
+
+
+@kernel
+def _receive_light(p: SunCells, cells, sun_b, intensity, albedo, light_out) -> None:
+    """Response to the Sun and the Earth before anything ages or differs from cell to cell."""
+    c = p.clip_normal_b
+    sun_side = c[0] * sun_b[0] + c[1] * sun_b[1] + c[2] * sun_b[2]
+    for i in range(light_out.shape[0]):
+        cell = cells[i]
+        v = albedo[i]
+        cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
+        if cosine >= p.cos_half_view and (cell.side * sun_side > 0.0 or cell.side == 0.0):
+            v += intensity * max(0.0, cosine)
+        if v < p.dropout:
+            v = 0.0
+        light_out[i] = warped(v) if p.warp else v
+
+
+@kernel
+def _degrade(p: SunCells, key, step, voltages) -> None:
+    n = voltages.shape[0]
+    if not p.degradation_per_cell:
+        factor = 1.0 - p.degradation * uniform4(key, Stream.CELL_DEGRADATION, step, 0)[0]
+        for i in range(n):
+            voltages[i] *= factor
+        return
+    for block in range((n + 3) // 4):
+        draws = uniform4(key, Stream.CELL_DEGRADATION, step, 1 + block)
+        first = 4 * block
+        for j in range(min(4, n - first)):
+            voltages[first + j] *= 1.0 - p.degradation * draws[j]
+
+
+@kernel
+def _add_noise(sigma, key, step, voltages) -> None:
+    n = voltages.shape[0]
+    for block in range((n + 3) // 4):
+        draws = normal4(key, Stream.CELL_NOISE, step, block)
+        first = 4 * block
+        for j in range(min(4, n - first)):
+            voltages[first + j] += sigma * draws[j]
+
+
+@kernel
+def _limit(p: SunCells, voltages) -> int:
+    """Outputs cut to the limits and rounded down as a converter does; mask of those at the top."""
+    saturated = 0
+    lsb = (p.output_high - p.output_low) / p.levels if p.levels > 0.0 else 0.0
+    top = p.output_high - lsb
+    for i in range(voltages.shape[0]):
+        v = voltages[i]
+        if v >= top:
+            v = top
+            saturated |= 1 << i
+        elif not v > p.output_low:
+            v = p.output_low
+        elif lsb > 0.0:
+            v = p.output_low + lsb * math.floor((v - p.output_low) / lsb)
+        voltages[i] = v
+    return saturated
+
+
+@kernel
+def sample(
+    p: SunCells,
+    cells,
+    key: RandomKey,
+    step: int,
+    sun_b: Vec3,
+    intensity: float,
+    albedo,
+    voltages_out,
+) -> int:
+    """Outputs of all cells at one control cycle; returns the mask of cells at their upper limit.
+
+    Args:
+        cells: (N,) of `cell_errors.CELL`.
+        step: number of the control cycle, which with `key` fixes all draws.
+        sun_b: unit vector to the Sun.
+        intensity: solar flux relative to 1 AU times the visible fraction of the disc [-].
+        albedo: (N,) light reflected by the Earth that each cell receives [-].
+        voltages_out: (N,) outputs [-], written.
+    """
+    _receive_light(p, cells, sun_b, intensity, albedo, voltages_out)
+    if p.degradation > 0.0:
+        _degrade(p, key, step, voltages_out)
+    for i in range(voltages_out.shape[0]):
+        voltages_out[i] = cells[i].gain * voltages_out[i] + cells[i].bias
+    if p.noise > 0.0:
+        _add_noise(p.noise, key, step, voltages_out)
+    if p.faults.shape[0] > 0:
+        apply_faults(p.faults, key, step, voltages_out)
+    return _limit(p, voltages_out)
