@@ -109,13 +109,7 @@ def gyro_usable(p: TrackingParameters, gyro_b: Vec3, gyro_valid: bool) -> bool:
     """True when the gyro may be used and its reading [rad/s] is one."""
     limit = p.gyro_limit
     # a NaN compares false
-    return (
-        p.use_gyro
-        and gyro_valid
-        and abs(gyro_b[0]) <= limit
-        and abs(gyro_b[1]) <= limit
-        and abs(gyro_b[2]) <= limit
-    )
+    return p.use_gyro and gyro_valid and abs(gyro_b[0]) <= limit and abs(gyro_b[1]) <= limit and abs(gyro_b[2]) <= limit
 
 
 @kernel

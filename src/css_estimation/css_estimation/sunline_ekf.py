@@ -227,7 +227,5 @@ def step(
         mask,
         mode,
     )
-    tracking, heading = finish_cycle(
-        p.tracking, tracking, dt, largest, gyro_b, gyro_ok, eclipse_predicted, estimate
-    )
+    tracking, heading = finish_cycle(p.tracking, tracking, dt, largest, gyro_b, gyro_ok, eclipse_predicted, estimate)
     return EkfState(started, covariance, tracking), heading

@@ -46,9 +46,7 @@ def update_cell(
 
 
 @kernel
-def constrain(
-    sun_b: Vec3, predicted_b: Vec3, covariance: Symmetric, largest_variance: float
-) -> tuple[Vec3, Symmetric]:
+def constrain(sun_b: Vec3, predicted_b: Vec3, covariance: Symmetric, largest_variance: float) -> tuple[Vec3, Symmetric]:
     """Unit state; covariance projected on the tangent plane, e^2/2 along the Sun line, bounded.
 
     A state that updates brought to nothing has no direction: the unit vector `predicted_b` takes its place.

@@ -57,9 +57,7 @@ PARAMETERS: Table = (
         low=0.0,
         high=180.0,
     ),
-    real(
-        "modes.search_wait", 20.0, "s", "sunlit time without Sun before the search begins", low=0.0, high=1e4
-    ),
+    real("modes.search_wait", 20.0, "s", "sunlit time without Sun before the search begins", low=0.0, high=1e4),
     real("modes.search_rate_deg", 1.0, "deg/s", "body rate of the search", low=0.01, high=2.0),
     real(
         "modes.search_angle_deg",
@@ -210,9 +208,7 @@ def next_mode(
     sunless_time = 0.0 if sun_valid or in_shadow else state.sunless_time + dt
     lit_time = state.lit_time + dt if sun_valid else 0.0
     search_time = state.search_time + dt if state.mode == MODE_SUN_SEARCH else 0.0
-    state = ModeState(
-        state.mode, state.reason, state.wanted, state.wanted_count, sunless_time, lit_time, search_time
-    )
+    state = ModeState(state.mode, state.reason, state.wanted, state.wanted_count, sunless_time, lit_time, search_time)
     wanted, reason = wanted_mode(p, state, inputs_ok, in_shadow, pointing_error, rate, rate_known)
     count = 0
     mode = state.mode

@@ -24,9 +24,7 @@ from sunpoint_control.wheel_allocation import AllocationParameters
 PARAMETERS: Table = (
     flag("dumping.enabled", False, "dump wheel momentum with the torque rods", tunable=True),
     real("dumping.gain", 0.005, "1/s", "despin gain c", low=0.0, high=10.0, tunable=True),
-    real(
-        "dumping.reference_speed_rpm", 0.0, "rpm", "wheel speed to dump to", low=-1e5, high=1e5, tunable=True
-    ),
+    real("dumping.reference_speed_rpm", 0.0, "rpm", "wheel speed to dump to", low=-1e5, high=1e5, tunable=True),
 )
 
 _RPM = math.pi / 30.0

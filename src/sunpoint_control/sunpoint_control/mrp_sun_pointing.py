@@ -26,9 +26,7 @@ PARAMETERS: Table = (
     real("gains.k", 0.148, "N m", "attitude gain K", low=0.0, tunable=True),
     real("gains.p", 0.9, "N m s", "rate gain P, the same on all axes", low=0.0, tunable=True),
     real("gains.ki", 1e-4, "1/(kg m^2)", "integral gain K_I", low=0.0, tunable=True),
-    real(
-        "gains.integral_limit", 10.0, "N m s", "bound on each axis of K int(sigma) dt", low=0.0, tunable=True
-    ),
+    real("gains.integral_limit", 10.0, "N m s", "bound on each axis of K int(sigma) dt", low=0.0, tunable=True),
     real(
         "deadband_deg",
         15.0,
@@ -38,9 +36,7 @@ PARAMETERS: Table = (
         high=180.0,
         tunable=True,
     ),
-    choice(
-        "deadband_behaviour", "zero", ("zero", "damp"), "torque in the deadband: none, or rate damping alone"
-    ),
+    choice("deadband_behaviour", "zero", ("zero", "damp"), "torque in the deadband: none, or rate damping alone"),
 )
 
 # Sine of an angle between Sun and array normal at which they no longer span a plane.

@@ -124,6 +124,11 @@ def initial_state(p: ControlParameters) -> ControlState:
     return ControlState(_ZERO, modes.initial_state())
 
 
+def at_rest(mode: int, reason: int) -> ControlOutput:
+    """Output of a control that does nothing: no torque, nothing known."""
+    return ControlOutput(_ZERO, _ZERO, _ZERO, -1.0, 0.0, mode, reason, False, False, 0, 0)
+
+
 @kernel
 def _within(values, limit: float) -> bool:
     # a NaN compares false
@@ -219,16 +224,8 @@ def step(
     rods_saturated = 0
     dumping = False
     dipole_out[:] = 0.0
-    if (
-        p.dumping.enabled
-        and field_valid
-        and inputs_ok
-        and mode != MODE_SAFE
-        and _within(field_b, _LARGEST_FIELD)
-    ):
-        rods_saturated, dumping = add_dumping(
-            p.dumping, p.wheels, wheel_speeds, field_b, torque_out, dipole_out
-        )
+    if p.dumping.enabled and field_valid and inputs_ok and mode != MODE_SAFE and _within(field_b, _LARGEST_FIELD):
+        rods_saturated, dumping = add_dumping(p.dumping, p.wheels, wheel_speeds, field_b, torque_out, dipole_out)
     output = ControlOutput(
         torque_b,
         z,

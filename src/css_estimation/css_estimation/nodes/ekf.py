@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Kalman-filtered Sun heading."""
+
+from css_common.run import node_main
+from css_estimation import sunline_ekf
+from css_estimation.sun_estimator import SunEstimator
+
+
+class Ekf(SunEstimator):
+    """Sun heading by an extended Kalman filter that turns with the body rate (O'Keefe & Schaub 2013)."""
+
+    algorithm = sunline_ekf
+    parameters = sunline_ekf.PARAMETERS
+
+
+main = node_main(Ekf)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Weighted-average Sun heading."""
+
+from css_common.run import node_main
+from css_estimation import wavg
+from css_estimation.sun_estimator import SunEstimator
+
+
+class Wavg(SunEstimator):
+    """Sun heading as the average of the lit cells' normals, weighted by their outputs (O'Keefe & Schaub 2013)."""
+
+    algorithm = wavg
+    parameters = wavg.PARAMETERS
+
+
+main = node_main(Wavg)
+
+if __name__ == "__main__":
+    raise SystemExit(main())
