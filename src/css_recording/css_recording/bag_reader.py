@@ -11,6 +11,8 @@ from css_recording.bag_storage import TopicCount, open_storage
 from css_recording.bag_writer import METADATA_RECORD
 from css_recording.errors import BagError
 
+LAST_NS = (1 << 63) - 1
+"""No stamp of ROS is as late as this."""
 CDR_LITTLE_ENDIAN = b"\x00\x01"
 
 
@@ -40,11 +42,12 @@ class BagReader:
         names = {absolute(old): absolute(new) for old, new in (remap or {}).items()}
         self._storage = open_storage(self.path)
         recorded = self._storage.topics()
-        missing = names.keys() - {entry.topic.name for entry in recorded}
-        if missing:
-            self._storage.close()
-            raise BagError(f"{self.path}: no topic {min(missing)} to rename")
         self._new_names = {topic.name: names.get(topic.name, topic.name) for topic, _ in recorded}
+        try:
+            self._check_renaming(names)
+        except BagError:
+            self._storage.close()
+            raise
         self._topics = [
             TopicCount(topic._replace(name=self._new_names[topic.name]), count) for topic, count in recorded
         ]
@@ -106,7 +109,7 @@ class BagReader:
         """
         wanted = self._recorded_names(topics)
         start_ns = 0 if start_ns is None else start_ns
-        end_ns = 1 << 64 if end_ns is None else end_ns
+        end_ns = LAST_NS if end_ns is None else end_ns
         for stamp_ns, topic, type_name, data in self._storage.messages(wanted, start_ns, end_ns):
             if data[:2] != CDR_LITTLE_ENDIAN:
                 raise BagError(
@@ -115,6 +118,15 @@ class BagReader:
                     + "; only little-endian CDR can be read"
                 )
             yield BagMessage(self._new_names[topic], type_name, stamp_ns, data)
+
+    def _check_renaming(self, names: Mapping[str, str]) -> None:
+        missing = names.keys() - self._new_names.keys()
+        if missing:
+            raise BagError(f"{self.path}: no topic {min(missing)} to rename")
+        new_names = list(self._new_names.values())
+        for name in new_names:
+            if new_names.count(name) > 1:
+                raise BagError(f"{self.path}: renaming gives two topics the name {name}")
 
     def _recorded_names(self, topics: Collection[str] | None) -> frozenset[str]:
         if topics is None:

@@ -79,10 +79,10 @@ class BagWriter:
         try:
             with self._disk():
                 self._output.start()
-            if metadata:
-                self.add_metadata(METADATA_RECORD, metadata)
             for topic in defined:
                 self.add_topic(topic)
+            if metadata:
+                self.add_metadata(METADATA_RECORD, metadata)
         except BagError:
             self._output.abandon()
             raise

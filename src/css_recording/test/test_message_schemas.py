@@ -88,9 +88,7 @@ def test_what_is_no_type_name_is_refused(name):
         split_type_name(name)
 
 
-@pytest.mark.parametrize(
-    "name", ["nowhere_msgs/msg/X", "std_msgs/msg/Nonesuch", "../msg/X", "std_msgs/msg/.."]
-)
+@pytest.mark.parametrize("name", ["nowhere_msgs/msg/X", "std_msgs/msg/Nonesuch", "../msg/X", "std_msgs/msg/.."])
 def test_types_that_are_not_installed_are_refused_by_name(name):
     with pytest.raises(BagError, match="not installed"):
         schema_of(name)

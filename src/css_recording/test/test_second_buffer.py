@@ -21,11 +21,7 @@ def run(messages, limits=LIMITS):
 
 
 def regular(steps, topics=3):
-    return [
-        (step * STEP_NS, topic, bytes([step % 256, topic]), 0)
-        for step in range(steps)
-        for topic in range(topics)
-    ]
+    return [(step * STEP_NS, topic, bytes([step % 256, topic]), 0) for step in range(steps) for topic in range(topics)]
 
 
 @given(st.integers(0, 2**32), st.integers(1, 45))
@@ -40,9 +36,7 @@ def test_order_of_arrival_within_the_hold_back_time_leaves_no_trace(seed, steps)
     assert [message for batch in batches for message in batch] == messages
 
 
-@given(
-    st.lists(st.tuples(st.integers(0, 8 * SECOND_NS), st.integers(0, 3), st.binary(max_size=40), st.just(0)))
-)
+@given(st.lists(st.tuples(st.integers(0, 8 * SECOND_NS), st.integers(0, 3), st.binary(max_size=40), st.just(0))))
 def test_nothing_is_lost_or_made_up_for_any_stamps(messages):
     batches, _ = run(messages, BufferLimits(open_bytes=200))
     assert sorted(message for batch in batches for message in batch) == sorted(messages)

@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a recorder cannot do it says, and what it has written stays."""
+
+import subprocess
+import sys
+
+import pytest
+
+from css_recording.bag_metadata import Topic
+from css_recording.bag_reader import BagReader
+from css_recording.bag_writer import BagWriter
+from css_recording.errors import BagError
+from css_recording.recovery import recover
+
+# A process that may write no more than this many bytes into one file: a full disk.
+FULL_DISK = """
+import resource, sys
+from css_recording.bag_writer import BagWriter
+from css_recording.bag_metadata import Topic
+from css_recording.errors import BagError
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
+try:
+    writer = BagWriter(sys.argv[1], [Topic("/css/voltages", "css_msgs/msg/CssVoltages")], {"mission": "m: 1"})
+    for step in range(20_000):
+        writer.write("/css/voltages", step * 100_000_000, b"\\0\\1\\0\\0" + step.to_bytes(8, "little") * 20)
+except BagError as error:
+    print(error)
+    for attempt in (lambda: writer.write("/css/voltages", 0, b""), writer.flush):
+        try:
+            attempt()
+            sys.exit("went on after the disk was full")
+        except BagError as again:
+            assert str(again) == str(error)
+    writer.close()
+    assert writer.closed
+"""
+
+
+@pytest.mark.parametrize("limit", [20_000, 100_000])
+def test_a_full_disk_ends_the_recording_and_keeps_what_was_written(tmp_path, limit):
+    folder = tmp_path / "bag"
+    run = subprocess.run(
+        [sys.executable, "-c", FULL_DISK, str(folder), str(limit)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    assert "cannot write the recording" in run.stdout
+    assert f"recover {folder}" in run.stdout
+    kept = recover(folder).messages["/css/voltages"]
+    assert kept > 0 and kept % 10 == 0
+    with BagReader(folder) as reader:
+        assert [m.stamp_ns for m in reader.messages()] == [step * 100_000_000 for step in range(kept)]
+
+
+def test_a_disk_that_is_full_from_the_start_is_refused(tmp_path):
+    code = FULL_DISK.replace("    for attempt in", "    sys.exit(3)\n    for attempt in")
+    command = [sys.executable, "-c", code, str(tmp_path / "bag"), "100"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert run.returncode == 3, run.stderr
+    assert "cannot write the recording" in run.stdout
+
+
+def test_a_folder_that_is_not_empty_is_refused(flight, tmp_path):
+    folder = flight.record(tmp_path / "bag", 5)
+    before = (folder / "bag_0.mcap").read_bytes()
+    with pytest.raises(BagError, match="not empty"):
+        BagWriter(folder, flight.topics)
+    assert (folder / "bag_0.mcap").read_bytes() == before
+
+
+def test_overwriting_replaces_a_recording_and_nothing_else(flight, tmp_path):
+    folder = flight.record(tmp_path / "bag", 5)
+    (folder / "bag_1.mcap").touch()
+    flight.record(folder, 12, overwrite=True)
+    with BagReader(folder) as reader:
+        assert reader.message_count == 36
+    assert not (folder / "bag_1.mcap").exists()
+    (folder / "thesis.txt").touch()
+    with pytest.raises(BagError, match=r"thesis\.txt"):
+        flight.record(folder, 3, overwrite=True)
+    with BagReader(folder) as reader:
+        assert reader.message_count == 36
+    (folder / "thesis.txt").unlink()
+    (folder / "folder").mkdir()
+    with pytest.raises(BagError, match="folder"):
+        flight.record(folder, 3, overwrite=True)
+
+
+def test_folders_that_cannot_be_made_are_refused(flight, tmp_path):
+    (tmp_path / "file").touch()
+    for folder in (tmp_path / "file", tmp_path / "file" / "bag", "/proc/nowhere/bag", tmp_path / ("x" * 300)):
+        with pytest.raises(BagError, match="cannot create the recording"):
+            BagWriter(folder, flight.topics)
+
+
+def test_unknown_types_are_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(BagError, match="not installed"):
+        BagWriter(tmp_path / "bag", [Topic("/a", "nowhere_msgs/msg/X")])
+    assert not (tmp_path / "bag").exists()
+
+
+def test_misuse_is_named(flight, tmp_path):
+    with BagWriter(tmp_path / "bag", flight.topics) as writer:
+        with pytest.raises(BagError, match=r"/nonesuch.*not added"):
+            writer.write("/nonesuch", 0, b"")
+        with pytest.raises(BagError, match="recorded as css_msgs/msg/CssVoltages"):
+            writer.add_topic(Topic("/css/voltages", "std_msgs/msg/Header"))
+    writer.close()
+    for action in (
+        lambda: writer.write("/css/voltages", 0, b""),
+        lambda: writer.add_topic(Topic("/b", "std_msgs/msg/Header")),
+        lambda: writer.add_metadata("event", {}),
+        writer.flush,
+    ):
+        with pytest.raises(BagError, match="closed"):
+            action()
+
+
+def test_an_error_in_flight_still_finishes_the_recording(flight, tmp_path):
+    with pytest.raises(ZeroDivisionError), BagWriter(tmp_path / "bag", flight.topics) as writer:
+        for message in flight.messages(15):
+            writer.write(*message)
+        _ = 1 / 0
+    with BagReader(tmp_path / "bag") as reader:
+        assert reader.message_count == 45
+
+
+def test_counts_are_of_what_was_received(flight, tmp_path):
+    with BagWriter(tmp_path / "bag", flight.topics) as writer:
+        for message in flight.messages(25):
+            writer.write(*message)
+        assert writer.counts == {topic.name: 25 for topic in flight.topics}
+    assert writer.counts == {topic.name: 25 for topic in flight.topics}
+
+
+def test_the_order_of_arrival_does_not_change_a_byte(flight, tmp_path):
+    messages = flight.messages(40)
+    swapped = [message for first in range(0, 120, 6) for message in reversed(messages[first : first + 6])]
+    files = []
+    for name, arrival in (("a", messages), ("b", swapped)):
+        folder = tmp_path / name / "bag"
+        with BagWriter(folder, flight.topics, {"mission": "m: 1"}) as writer:
+            for message in arrival:
+                writer.write(*message)
+        files.append([(folder / file).read_bytes() for file in ("bag_0.mcap", "metadata.yaml")])
+    assert files[0] == files[1]
