@@ -6,12 +6,13 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from bootstrap import fingerprint
 from bootstrap.environment import changes, compose, toolchain
 from bootstrap.plan import Need
-from bootstrap.progress import CommandFailed, Step, run
+from bootstrap.progress import Step
 from bootstrap.project import Environment, Refusal
 from bootstrap.work import Work
 
@@ -25,52 +26,49 @@ OPTIONS = (
 )
 
 
+FAILED = "failed"
+"""In place of a fingerprint: built before, failed since, and what is there is good to continue from."""
+
+
 def build(work: Work, need: Need) -> None:
     """Build what changed, forget what is gone. Raises Refusal with the end of colcon's output."""
     state = work.state
     for name in need.removed:
         _discard(work, name)
         del state.packages[name]
+    known = [name for name in need.packages if state.packages.pop(name, None)]
+    # Forgotten before it is touched, so that an interrupted build counts as none.
+    work.save()
     for name in need.packages:
-        if state.packages.pop(name, None) is None:
-            # Never built, or its build was interrupted: begin from nothing.
-            _discard(work, name)
-        else:
+        if name in known:
             # Executables whose source is gone would stay.
             shutil.rmtree(work.project.executable(name, "any").parent, ignore_errors=True)
             _result_file(work, name).unlink(missing_ok=True)
-    # Forgotten before it is touched, so that an interrupted build counts as none.
-    work.save()
+        else:
+            _discard(work, name)
     if need.packages:
-        _colcon(work, need)
+        _colcon(work, need.packages, known)
     state.environment = _environment(work)
     work.save()
 
 
-def _colcon(work: Work, need: Need) -> None:
-    names = sorted(need.packages)
+def _colcon(work: Work, wanted: Mapping[str, str], known: Sequence[str]) -> None:
     log = work.log("build.log")
-    label = "building the ROS packages" if not work.state.packages else f"building {', '.join(names)}"
-    python = work.project.python
-    command: list[str | Path] = [python, "-c", COLCON, "--log-base", "log/colcon", "build"]
-    command += [*_selection(work, names), *OPTIONS]
-    failure = None
+    label = f"building {', '.join(wanted)}" if work.state.packages else "building the ROS packages"
+    command: list[str | Path] = [work.project.python, "-c", COLCON, "--log-base", "log/colcon", "build"]
+    command += [*_selection(work, list(wanted)), *OPTIONS]
     with Step(label) as step:
         try:
-            run(step, command, work.env, work.project.root, log)
-        except CommandFailed as error:
-            failure = work.explained(error, label)
+            work.run(step, command, log)
+        except Refusal:
+            work.state.packages.update(dict.fromkeys(known, FAILED))
+            raise
         finally:
-            built = [name for name in names if _succeeded(work, name)]
-            work.state.packages.update({name: need.packages[name] for name in built})
+            work.state.packages.update({name: wanted[name] for name in wanted if _succeeded(work, name)})
             work.save()
-        if failure:
-            raise failure
-    if len(built) < len(names):
-        missing = ", ".join(sorted(set(names) - set(built)))
-        raise Refusal(
-            f"colcon did not build {missing}", f"the whole output is in {log.relative_to(work.project.root)}"
-        )
+    if missing := [name for name in wanted if not _succeeded(work, name)]:
+        where = log.relative_to(work.project.root)
+        raise Refusal(f"colcon did not build {', '.join(missing)}", f"the whole output is in {where}")
 
 
 def _selection(work: Work, names: list[str]) -> list[str]:

@@ -92,8 +92,10 @@ def check_folder(root: Path) -> None:
 def check(root: Path, ros: str, env: Mapping[str, str]) -> None:
     """Raises Refusal naming the first thing that is missing."""
     check_folder(root)
+    if ros == SYSTEM:
+        system_python(env)
+    else:
+        check_libc()
     check_venv_module()
     check_compiler(env)
     check_python_headers(sysconfig.get_path("include", "posix_prefix"))
-    if ros != SYSTEM:
-        check_libc()

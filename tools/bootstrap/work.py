@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -26,6 +27,7 @@ NETWORK_SIGNS = (
     "No matching distribution found for uv",
 )
 DISK_SIGNS = ("No space left on device", "Disk quota exceeded")
+FULL = 20_000_000  # [bytes] free space below which a failure is put down to the disk, whatever it says
 
 
 def disk_full(project: Project) -> Refusal:
@@ -65,19 +67,20 @@ class Work:
         try:
             run(step, command, self.env, self.project.root, log)
         except CommandFailed as failure:
-            raise self.explained(failure, step.label) from None
+            raise self.explained(failure) from None
 
-    def explained(self, failure: CommandFailed, doing: str) -> Refusal:
+    def explained(self, failure: CommandFailed) -> Refusal:
         """The failure of a command as a message: a known cause by name, else the end of its output."""
         log = failure.log.relative_to(self.project.root)
-        if any(sign in failure.output for sign in DISK_SIGNS):
+        free = shutil.disk_usage(self.project.root).free
+        if free < FULL or any(sign in failure.output for sign in DISK_SIGNS):
             return disk_full(self.project)
         if any(sign in failure.output for sign in NETWORK_SIGNS):
             return Refusal(
                 f"the package index (PyPI) could not be reached; {log} has the details",
                 "check the network or proxy (HTTPS_PROXY), then run it again; what was downloaded is kept",
             )
-        return Refusal(f"{doing} failed\n{failure.output}\n", f"the whole output is in {log}")
+        return Refusal(f"the end of {log}:\n{failure.output}")
 
     def ask_python(self, code: str) -> str:
         """What a line of code prints in the environment's Python."""
