@@ -17,24 +17,29 @@ READABLE = 1e100
 _IN_PLANE = 1e-9
 
 
+CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side")], align=True)
+"""One cell: outward unit normal in b, and its component along the clip normal; 0: the cell is not clipped."""
+
+
 class CellLayout(NamedTuple):
     """Geometry of N cells."""
 
-    normals_b: np.ndarray  # (N, 3) outward unit normals
-    side: np.ndarray  # (N,) component of each normal along the clip normal; 0: the cell is not clipped
+    cells: np.ndarray  # (N,) of CELL: one array, because each one in a parameter costs time at every call
     clip_normal_b: Vec3  # [-] normal of the plane that hides the other half space; zeros: none
     cos_half_view: float  # [-] cosine of half the view cone
 
 
 def cell_layout(values: Values) -> CellLayout:
     """Layout of the mission's `cells` section."""
-    normals_b = np.ascontiguousarray(values.cells.normals, dtype=np.float64)
+    normals_b = np.asarray(values.cells.normals, dtype=np.float64)
     clip_normal_b = np.asarray(values.cells.clip_normal, dtype=np.float64)
-    side = normals_b @ clip_normal_b
-    side[np.abs(side) < _IN_PLANE] = 0.0
+    cells = np.zeros(len(normals_b), CELL)
+    cells["nx"], cells["ny"], cells["nz"] = normals_b.T
+    cells["side"] = normals_b @ clip_normal_b
+    cells["side"][np.abs(cells["side"]) < _IN_PLANE] = 0.0
     x, y, z = (float(c) for c in clip_normal_b)
     cos_half_view = math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
-    return CellLayout(normals_b, side, (x, y, z), cos_half_view)
+    return CellLayout(cells, (x, y, z), cos_half_view)
 
 
 @kernel
@@ -44,14 +49,13 @@ def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
     It is inside the cone about the normal and on the cell's own side of the clipping plane
     (O'Keefe & Schaub 2013, Fig. 1).
     """
-    n, d = layout.normals_b, direction_b
-    if n[i, 0] * d[0] + n[i, 1] * d[1] + n[i, 2] * d[2] < layout.cos_half_view:
+    cell, d = layout.cells[i], direction_b
+    if cell.nx * d[0] + cell.ny * d[1] + cell.nz * d[2] < layout.cos_half_view:
         return False
-    side = layout.side[i]
-    if side == 0.0:
+    if cell.side == 0.0:
         return True
     c = layout.clip_normal_b
-    return side * (c[0] * d[0] + c[1] * d[1] + c[2] * d[2]) > 0.0
+    return cell.side * (c[0] * d[0] + c[1] * d[1] + c[2] * d[2]) > 0.0
 
 
 @kernel

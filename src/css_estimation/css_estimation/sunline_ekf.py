@@ -103,7 +103,7 @@ _LARGEST_READING = 2.0
 class EkfParameters(NamedTuple):
     """Built by `parameters`; variances in rad^2, process noise in rad^2/s."""
 
-    cells: CellLayout
+    layout: CellLayout
     gate: Gate
     cell_variance: float
     process_noise: float
@@ -125,7 +125,7 @@ class EkfState(NamedTuple):
 def parameters(values: Values) -> EkfParameters:
     """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
     return EkfParameters(
-        cells=cell_layout(values),
+        layout=cell_layout(values),
         gate=Gate(True, values.gate, values.minimum_output),
         cell_variance=values.cell_sigma**2,
         process_noise=values.process_sigma**2,
@@ -149,7 +149,7 @@ def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages,
     Returns:
         state (not yet of unit length), covariance, NIS, its degrees of freedom, mask of the cells used.
     """
-    n = p.cells.normals_b
+    cells = p.layout.cells
     level = p.gate.level * largest
     predicted_b = sun_b
     nis = 0.0
@@ -157,10 +157,10 @@ def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages,
     count = 0
     for i in range(voltages.shape[0]):
         v = voltages[i]
-        if not (-READABLE < v < READABLE and (v > level or sees(p.cells, i, predicted_b))):
+        if not (-READABLE < v < READABLE and (v > level or sees(p.layout, i, predicted_b))):
             continue
         v = min(max(v, -_LARGEST_READING), _LARGEST_READING)
-        normal_b = (n[i, 0], n[i, 1], n[i, 2])
+        normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
         sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, p.cell_variance)
         nis += q
         mask |= 1 << i
@@ -203,7 +203,7 @@ def step(
     if lit:
         mode = MODE_TRACKING
         if not started or trace(covariance) > 3.0 * p.initial_variance:
-            average_b, _, average_mode = weighted_average(p.cells, p.gate, voltages, top)
+            average_b, _, average_mode = weighted_average(p.layout, p.gate, voltages, top)
             if average_mode != MODE_NO_SUN:
                 sun_b = average_b
                 covariance = isotropic(p.initial_variance)

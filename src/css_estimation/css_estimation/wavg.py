@@ -56,7 +56,7 @@ class Gate(NamedTuple):
 class WavgParameters(NamedTuple):
     """Built by `parameters`."""
 
-    cells: CellLayout
+    layout: CellLayout
     gate: Gate
     propagate_held: bool
     tracking: TrackingParameters
@@ -65,7 +65,7 @@ class WavgParameters(NamedTuple):
 def parameters(values: Values) -> WavgParameters:
     """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
     return WavgParameters(
-        cells=cell_layout(values),
+        layout=cell_layout(values),
         gate=Gate(values.gate_kind == "relative", values.gate, values.minimum_output),
         propagate_held=values.propagate_held,
         tracking=sun_tracking.parameters(values),
@@ -78,14 +78,14 @@ def initial_state(p: WavgParameters) -> TrackingState:
 
 
 @kernel
-def weighted_average(cells: CellLayout, gate: Gate, voltages, top: int) -> tuple[Vec3, int, int]:
+def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tuple[Vec3, int, int]:
     """Sun heading (unit, in b), mask of the cells it uses, and mode; heading zero and mode 0 without a Sun.
 
     Args:
         voltages: (N,) cell outputs [-]; values that are not finite count as dark.
         top: result of `brightest`.
     """
-    n = cells.normals_b
+    cells = layout.cells
     if top < 0 or voltages[top] <= gate.minimum_output:
         return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
     level = gate.level * voltages[top] if gate.relative else gate.level
@@ -94,13 +94,13 @@ def weighted_average(cells: CellLayout, gate: Gate, voltages, top: int) -> tuple
     count = 0
     for i in range(voltages.shape[0]):
         if voltages[i] > level and voltages[i] < READABLE:
-            x += voltages[i] * n[i, 0]
-            y += voltages[i] * n[i, 1]
-            z += voltages[i] * n[i, 2]
+            x += voltages[i] * cells[i].nx
+            y += voltages[i] * cells[i].ny
+            z += voltages[i] * cells[i].nz
             mask |= 1 << i
             count += 1
     if count == 0:
-        return (n[top, 0], n[top, 1], n[top, 2]), 1 << top, MODE_BELOW_GATE
+        return (cells[top].nx, cells[top].ny, cells[top].nz), 1 << top, MODE_BELOW_GATE
     length = norm((x, y, z))
     if length < _NO_DIRECTION:
         return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
@@ -121,7 +121,7 @@ def step(
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, gyro_b, gyro_valid)
     top = brightest(voltages)
-    sun_b, lit_mask, mode = weighted_average(p.cells, p.gate, voltages, top)
+    sun_b, lit_mask, mode = weighted_average(p.layout, p.gate, voltages, top)
     valid = mode != MODE_NO_SUN
     if not valid and state.validity != VALIDITY_NONE:
         sun_b = state.sun_b

@@ -18,8 +18,8 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, flag, real
-from css_common.vectors import Vec3, cross, dot, norm, row, unit
-from sunpoint_control.wheel_allocation import AllocationParameters
+from css_common.vectors import Vec3, add, cross, dot, norm, row, scale, subtract, unit
+from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
 
 PARAMETERS: Table = (
     flag("dumping.enabled", False, "dump wheel momentum with the torque rods", tunable=True),
@@ -109,7 +109,7 @@ def rod_torque(rod_axes_b, dipoles, field_b: Vec3) -> Vec3:
 
 @kernel
 def add_dumping(
-    p: DumpingParameters, wheels: AllocationParameters, speeds, field_b: Vec3, torques, dipoles
+    p: DumpingParameters, allocation: AllocationParameters, speeds, field_b: Vec3, torques, dipoles
 ) -> tuple[int, bool]:
     """Adds the dumping torques to motor torques (n,) [N m] within limits, and sets the dipoles (m,).
 
@@ -121,40 +121,37 @@ def add_dumping(
         mask of the rods that were asked for more than they may give, and whether anything is dumped.
     """
     dipoles[:] = 0.0
-    axes = wheels.axes_b
-    n = axes.shape[0]
+    n = torques.shape[0]
     if norm(field_b) < _NO_FIELD:
         return 0, False
     wanted = (0.0, 0.0, 0.0)
     for i in range(n):
-        u = _despin_torque(p, wheels, speeds, i)
-        wanted = (wanted[0] + u * axes[i, 0], wanted[1] + u * axes[i, 1], wanted[2] + u * axes[i, 2])
+        wheel = allocation.wheels[i]
+        wanted = add(wanted, scale(_despin_torque(p, wheel, speeds[i]), spin_axis(wheel)))
     rod_dipoles(p.rod_axes_b, wanted, field_b, dipoles)
     mask = _limit_dipoles(p.max_dipole, dipoles)
-    tau = rod_torque(p.rod_axes_b, dipoles, field_b)
+    rest = subtract(rod_torque(p.rod_axes_b, dipoles, field_b), wanted)
 
-    # Gs^+ is the map of the allocation with the sign of the reaction
-    rest = (tau[0] - wanted[0], tau[1] - wanted[1], tau[2] - wanted[2])
-    m = wheels.inverse
     share = 1.0
+    limit = allocation.max_torque
     for i in range(n):
-        u = _despin_torque(p, wheels, speeds, i) + dot(row(m, i), rest)
-        room = max(wheels.max_torque - (torques[i] if u > 0.0 else -torques[i]), 0.0)
+        u = _despin_torque(p, allocation.wheels[i], speeds[i]) + least_torque(allocation.wheels[i], rest)
+        room = max(limit - (torques[i] if u > 0.0 else -torques[i]), 0.0)
         if abs(u) > room:
             share = min(share, room / abs(u))
     for i in range(n):
-        torques[i] += share * (_despin_torque(p, wheels, speeds, i) + dot(row(m, i), rest))
+        u = _despin_torque(p, allocation.wheels[i], speeds[i]) + least_torque(allocation.wheels[i], rest)
+        torques[i] += share * u
     for j in range(dipoles.shape[0]):
         dipoles[j] *= share
     return mask, share > 0.0
 
 
 @kernel
-def _despin_torque(p: DumpingParameters, wheels: AllocationParameters, speeds, i: int) -> float:
-    m = wheels.inverse
-    if m[i, 0] == 0.0 and m[i, 1] == 0.0 and m[i, 2] == 0.0:
+def _despin_torque(p: DumpingParameters, wheel, speed: float) -> float:
+    if wheel.mx == 0.0 and wheel.my == 0.0 and wheel.mz == 0.0:
         return 0.0  # out of service
-    return -p.gain * p.wheel_inertia * (speeds[i] - p.reference_speed)
+    return -p.gain * p.wheel_inertia * (speed - p.reference_speed)
 
 
 @kernel

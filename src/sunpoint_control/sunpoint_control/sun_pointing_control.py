@@ -69,7 +69,7 @@ class ControlParameters(NamedTuple):
 
     pointing: PointingParameters
     eclipse_behaviour: int
-    wheels: AllocationParameters
+    allocation: AllocationParameters
     modes: ModeParameters
     dumping: DumpingParameters
 
@@ -102,7 +102,7 @@ def parameters(values: Values) -> ControlParameters:
     return ControlParameters(
         pointing=mrp_sun_pointing.parameters(values),
         eclipse_behaviour=_ECLIPSE[values.eclipse_behaviour],
-        wheels=wheel_allocation.parameters(values),
+        allocation=wheel_allocation.parameters(values),
         modes=modes.parameters(values),
         dumping=momentum_dumping.parameters(values),
     )
@@ -176,7 +176,7 @@ def step(
     momentum_b = _ZERO
     if inputs_ok:
         rate = norm(omega_bn_b)
-        momentum_b = wheel_momentum(p.wheels.axes_b, p.dumping.wheel_inertia, wheel_speeds, omega_bn_b)
+        momentum_b = wheel_momentum(p.allocation.wheels, p.dumping.wheel_inertia, wheel_speeds, omega_bn_b)
         if validity != _VALIDITY_NONE:
             sigma_br, error = error_mrp(sun_b, p.pointing.array_normal_b)
     rate_known = inputs_ok and rate_source != _RATE_NONE
@@ -214,8 +214,8 @@ def step(
         elif mode != MODE_ECLIPSE or p.eclipse_behaviour != _COAST:
             torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
 
-    allocate(p.wheels, torque_b, torque_out)
-    wheels_saturated = limit_torques(p.wheels, torque_out)
+    allocate(p.allocation, torque_b, torque_out)
+    wheels_saturated = limit_torques(p.allocation, torque_out)
     integral = state.integral
     if feedback and wheels_saturated == 0:
         # held in the deadband, in the shadow and at a torque limit: what cannot act must not wind up
@@ -225,7 +225,7 @@ def step(
     dumping = False
     dipole_out[:] = 0.0
     if p.dumping.enabled and field_valid and inputs_ok and mode != MODE_SAFE and _within(field_b, _LARGEST_FIELD):
-        rods_saturated, dumping = add_dumping(p.dumping, p.wheels, wheel_speeds, field_b, torque_out, dipole_out)
+        rods_saturated, dumping = add_dumping(p.dumping, p.allocation, wheel_speeds, field_b, torque_out, dipole_out)
     output = ControlOutput(
         torque_b,
         z,

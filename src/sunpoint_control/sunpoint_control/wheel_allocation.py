@@ -13,7 +13,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, choice, integers
-from css_common.vectors import Vec3, dot, row
+from css_common.vectors import Vec3, dot
 
 PARAMETERS: Table = (
     choice(
@@ -27,11 +27,14 @@ PARAMETERS: Table = (
 )
 
 
+WHEEL = np.dtype([(name, np.float64) for name in ("gx", "gy", "gz", "mx", "my", "mz")], align=True)
+"""One wheel: unit spin axis in b, and its row of the pseudo-inverse of Gs; zeros: out of service."""
+
+
 class AllocationParameters(NamedTuple):
     """Built by `parameters`."""
 
-    axes_b: np.ndarray  # (n, 3) spin axes
-    inverse: np.ndarray  # (n, 3) pseudo-inverse of Gs; zero rows: out of service
+    wheels: np.ndarray  # (n,) of WHEEL: one array, because each one in a parameter costs time at every call
     max_torque: float  # [N m] of each wheel
     keep_direction: bool
 
@@ -40,26 +43,39 @@ def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
     """Map (n, 3) from a torque in b to wheel torques of least norm, for (n, 3) axes, by SVD."""
     axes = np.array(axes_b, dtype=np.float64)
     axes[list(out_of_service)] = 0.0
-    return np.ascontiguousarray(np.linalg.pinv(axes.T))
+    return np.linalg.pinv(axes.T)
 
 
 def parameters(values: Values) -> AllocationParameters:
     """Parameters from checked values (`PARAMETERS` and the mission's `wheels`)."""
-    axes_b = np.ascontiguousarray(values.wheels.axes, dtype=np.float64)
+    axes_b = np.asarray(values.wheels.axes, dtype=np.float64)
+    wheels = np.zeros(len(axes_b), WHEEL)
+    wheels["gx"], wheels["gy"], wheels["gz"] = axes_b.T
+    wheels["mx"], wheels["my"], wheels["mz"] = pseudo_inverse(axes_b, values.wheels_out).T
     return AllocationParameters(
-        axes_b=axes_b,
-        inverse=pseudo_inverse(axes_b, values.wheels_out),
+        wheels=wheels,
         max_torque=values.wheels.max_torque,
         keep_direction=values.wheel_saturation == "scale",
     )
 
 
 @kernel
+def spin_axis(wheel) -> Vec3:
+    """Unit spin axis in b of one `WHEEL`."""
+    return (wheel.gx, wheel.gy, wheel.gz)
+
+
+@kernel
+def least_torque(wheel, torque_b: Vec3) -> float:
+    """Share of one `WHEEL` in the least wheel torques u with Gs u = torque_b."""
+    return wheel.mx * torque_b[0] + wheel.my * torque_b[1] + wheel.mz * torque_b[2]
+
+
+@kernel
 def allocate(p: AllocationParameters, torque_b: Vec3, out) -> None:
     """Writes the motor torques (n,) [N m] with the reaction `torque_b` [N m] on the body, -Gs u."""
-    m = p.inverse
-    for i in range(m.shape[0]):
-        out[i] = -(m[i, 0] * torque_b[0] + m[i, 1] * torque_b[1] + m[i, 2] * torque_b[2])
+    for i in range(out.shape[0]):
+        out[i] = -least_torque(p.wheels[i], torque_b)
 
 
 @kernel
@@ -82,17 +98,17 @@ def limit_torques(p: AllocationParameters, torques) -> int:
 
 
 @kernel
-def wheel_momentum(axes_b, wheel_inertia: float, speeds, omega_bn_b: Vec3) -> Vec3:
+def wheel_momentum(wheels, wheel_inertia: float, speeds, omega_bn_b: Vec3) -> Vec3:
     """Gs h_s [N m s], h_i = Js (Omega_i + g_i . omega): momentum of the wheels about their spin axes, in b.
 
     Args:
-        axes_b: (n, 3) spin axes.
+        wheels: (n,) of `WHEEL`.
         wheel_inertia: Js [kg m^2].
         speeds: (n,) speeds relative to the body [rad/s].
     """
     x = y = z = 0.0
-    for i in range(axes_b.shape[0]):
-        g = row(axes_b, i)
+    for i in range(wheels.shape[0]):
+        g = spin_axis(wheels[i])
         h = wheel_inertia * (speeds[i] + dot(g, omega_bn_b))
         x += h * g[0]
         y += h * g[1]
