@@ -60,7 +60,7 @@ class BagReader:
     @property
     def message_count(self) -> int:
         """Number of messages of all topics."""
-        return sum(entry.messages for entry in self._topics)
+        return sum(entry.count for entry in self._topics)
 
     @property
     def start_ns(self) -> int:

@@ -24,7 +24,7 @@ class TopicCount(NamedTuple):
     """A topic of a recording and how many messages it has."""
 
     topic: Topic
-    messages: int
+    count: int  # type: ignore[assignment]  # the method of tuples that it hides is not missed
 
 
 class BagStorage(Protocol):
@@ -115,7 +115,7 @@ class McapStorage:
                 before = counts.get(topic.name, TopicCount(topic, 0))
                 if before.topic.type != topic.type:
                     raise BagError(f"{file.path}: topic {topic.name} has two types")
-                counts[topic.name] = before._replace(messages=before.messages + numbers.get(channel_id, 0))
+                counts[topic.name] = before._replace(count=before.count + numbers.get(channel_id, 0))
         return list(counts.values())
 
     def time_span(self) -> tuple[int, int]:

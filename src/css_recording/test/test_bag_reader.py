@@ -54,7 +54,7 @@ def test_folders_written_by_rosbags(flight, tmp_path, plugin):
     folder = write_with_rosbags(flight, tmp_path / "bag", plugin)
     assert read(folder) == flight.messages(STEPS)
     with BagReader(folder) as reader:
-        assert {entry.topic.name: entry.messages for entry in reader.topics} == {
+        assert {entry.topic.name: entry.count for entry in reader.topics} == {
             topic.name: STEPS for topic in flight.topics
         }
         assert reader.duration_ns == (STEPS - 1) * 100_000_000

@@ -105,7 +105,7 @@ def test_topic_without_messages_and_topic_added_in_flight(flight, tmp_path, doct
         writer.add_topic(extra)
     doctor(writer.path)
     with BagReader(writer.folder) as reader:
-        assert {entry.topic.name: entry.messages for entry in reader.topics} == {
+        assert {entry.topic.name: entry.count for entry in reader.topics} == {
             "/css/voltages": 30,
             "/extra": 0,
         }
