@@ -90,12 +90,17 @@ class FlightLog:
     control: Columns | None = None
     notes: list[str] = field(default_factory=list)
 
+    def columns(self) -> list[Columns]:
+        """All columns of the log, none of them empty."""
+        single = [getattr(self, name) for name in _SINGLE]
+        return [columns for columns in (*single, *self.estimates.values()) if columns is not None]
+
     @cached_property
     def epoch_ns(self) -> int:
         """Instant from which `time` counts: the mission's epoch, else the first stamp of the log."""
         if self.mission is not None:
             return self.mission.epoch_ns
-        return min((int(c.stamp_ns[0]) for c in self._all_columns() if len(c)), default=0)
+        return min((int(columns.stamp_ns[0]) for columns in self.columns()), default=0)
 
     def time(self, columns: Columns) -> np.ndarray:
         """Time [s] of each row since the epoch."""
@@ -170,10 +175,6 @@ class FlightLog:
         rows = np.where(nearer, after, before)
         near = np.abs(stamps[rows] - columns.stamp_ns) <= 0.5e9 * self.period
         return np.flatnonzero(near), rows[near]
-
-    def _all_columns(self) -> list[Columns]:
-        single = [getattr(self, name) for name in _SINGLE]
-        return [columns for columns in (*single, *self.estimates.values()) if columns is not None]
 
     def _required_truth(self) -> Columns:
         if self.truth is None:
