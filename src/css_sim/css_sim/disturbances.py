@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Environmental torques on the spacecraft: gravity gradient, aerodynamic drag, solar pressure, residual dipole.
+
+Formulas as in Wertz (ed.), Spacecraft Attitude Determination and Control, section 17.2. Drag and solar pressure act
+on flat panels that do not shade each other. Everything is off unless asked for: O'Keefe & Schaub 2013 has none.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, flag, real, reals
+from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, norm, scale, unit
+from css_environment.constants import EARTH_MU, EARTH_ROTATION_RATE
+from css_environment.ephemeris import EnvironmentState
+
+PARAMETERS: Table = (
+    flag("disturbances.gravity_gradient", False, "torque of the Earth's gravity gradient"),
+    flag("disturbances.aerodynamic", False, "torque of drag on the panels"),
+    flag("disturbances.solar_pressure", False, "torque of sunlight on the panels"),
+    reals("disturbances.dipole", (0.0, 0.0, 0.0), "A m^2", "residual magnetic dipole of the spacecraft", length=3),
+    reals("panels.areas", (), "m^2", "area of each flat panel; a plate with two sides is two panels", low=0.0),
+    reals("panels.normals", (), "-", "outward unit normals of the panels in b, a row each", columns=3),
+    reals("panels.centres", (), "m", "centres of the panels in b from the centre of mass, a row each", columns=3),
+    real("panels.drag_coefficient", 2.2, "-", "drag coefficient of all panels", low=0.0, high=10.0),
+    real("panels.specular", 0.1, "-", "fraction of sunlight reflected like a mirror", low=0.0, high=1.0),
+    real("panels.diffuse", 0.2, "-", "fraction of sunlight scattered", low=0.0, high=1.0),
+)
+
+SOLAR_PRESSURE = 4.56e-6
+"""Pressure of sunlight on a black surface at 1 AU [N/m^2] (Montenbruck & Gill, section 3.4)."""
+
+PANEL = np.dtype([(name, np.float64) for name in ("area", "nx", "ny", "nz", "cx", "cy", "cz")], align=True)
+"""One panel: area [m^2], outward unit normal and centre [m] from the centre of mass, both in b."""
+
+
+class Disturbances(NamedTuple):
+    """Which torques act, and on what."""
+
+    gravity_gradient: bool
+    aerodynamic: bool
+    solar_pressure: bool
+    dipole_b: Vec3  # [A m^2]
+    drag_coefficient: float
+    specular: float
+    diffuse: float
+    panels: np.ndarray  # (K,) of PANEL
+
+
+def parameters(values: Values) -> Disturbances:
+    """Parameters of `disturbance_torque` from checked values (`PARAMETERS`)."""
+    x, y, z = (float(m) for m in values.disturbances.dipole)
+    panels = np.zeros(len(values.panels.areas), PANEL)
+    panels["area"] = values.panels.areas
+    panels["nx"], panels["ny"], panels["nz"] = values.panels.normals.T
+    panels["cx"], panels["cy"], panels["cz"] = values.panels.centres.T
+    return Disturbances(
+        gravity_gradient=values.disturbances.gravity_gradient,
+        aerodynamic=values.disturbances.aerodynamic,
+        solar_pressure=values.disturbances.solar_pressure,
+        dipole_b=(x, y, z),
+        drag_coefficient=values.panels.drag_coefficient,
+        specular=values.panels.specular,
+        diffuse=values.panels.diffuse,
+        panels=panels,
+    )
+
+
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values, one message each."""
+    count = len(values.panels.areas)
+    for name in ("normals", "centres"):
+        rows = len(getattr(values.panels, name))
+        if rows != count:
+            yield f"panels.{name}: {rows} rows given for {count} areas, expected one each"
+    for i, length in enumerate(np.linalg.norm(values.panels.normals, axis=1)):
+        if abs(length - 1.0) > 1e-6:
+            yield f"panels.normals: row {i} has length {length:.6g}, expected unit vectors"
+    if values.panels.specular + values.panels.diffuse > 1.0:
+        total = values.panels.specular + values.panels.diffuse
+        yield f"panels.specular + panels.diffuse: {total:.6g} given, expected at most 1"
+    for name in ("aerodynamic", "solar_pressure"):
+        if getattr(values.disturbances, name) and count == 0:
+            yield f"disturbances.{name}: true given without panels, expected panels.areas, normals and centres"
+
+
+@kernel
+def gravity_gradient_torque(inertia: Mat3, r_b: Vec3) -> Vec3:
+    """Torque [N m] at the position `r_b` [m] from the centre of the Earth, in b."""
+    r = norm(r_b)
+    u = scale(1.0 / r, r_b)
+    return scale(3.0 * EARTH_MU / (r * r * r), cross(u, multiply(inertia, u)))
+
+
+@kernel
+def air_velocity(r_n: Vec3, v_n: Vec3) -> Vec3:
+    """Velocity [m/s] relative to air that turns with the Earth (axis taken as the z axis of n)."""
+    return (v_n[0] + EARTH_ROTATION_RATE * r_n[1], v_n[1] - EARTH_ROTATION_RATE * r_n[0], v_n[2])
+
+
+@kernel
+def aerodynamic_torque(panels, drag_coefficient: float, velocity_b: Vec3, density: float) -> Vec3:
+    """Torque [N m] of air of `density` [kg/m^3] met at `velocity_b` [m/s]; momentum flux opposes the velocity."""
+    speed = norm(velocity_b)
+    wind = unit(velocity_b)
+    pressure = 0.5 * density * drag_coefficient * speed * speed
+    moment = (0.0, 0.0, 0.0)
+    for i in range(panels.shape[0]):
+        panel = panels[i]
+        facing = dot((panel.nx, panel.ny, panel.nz), wind)
+        if facing > 0.0:
+            moment = add(moment, scale(panel.area * facing, (panel.cx, panel.cy, panel.cz)))
+    return scale(-pressure, cross(moment, wind))
+
+
+@kernel
+def solar_pressure_torque(panels, specular: float, diffuse: float, sun_b: Vec3, pressure: float) -> Vec3:
+    """Torque [N m] of sunlight from the unit direction `sun_b` with a `pressure` [N/m^2] on black surfaces."""
+    torque = (0.0, 0.0, 0.0)
+    for i in range(panels.shape[0]):
+        panel = panels[i]
+        n = (panel.nx, panel.ny, panel.nz)
+        facing = dot(n, sun_b)
+        if facing > 0.0:
+            along_sun = scale(1.0 - specular, sun_b)
+            along_normal = scale(2.0 * (specular * facing + diffuse / 3.0), n)
+            force = scale(-pressure * panel.area * facing, add(along_sun, along_normal))
+            torque = add(torque, cross((panel.cx, panel.cy, panel.cz), force))
+    return torque
+
+
+@kernel
+def disturbance_torque(
+    p: Disturbances, inertia: Mat3, dcm_bn: Mat3, environment: EnvironmentState, density: float
+) -> Vec3:
+    """Sum of the torques that `p` asks for [N m], in b.
+
+    Args:
+        inertia: of the whole spacecraft [kg m^2].
+        dcm_bn: attitude.
+        environment: what surrounds the spacecraft.
+        density: of the air [kg/m^3].
+    """
+    torque = (0.0, 0.0, 0.0)
+    if p.gravity_gradient:
+        torque = add(torque, gravity_gradient_torque(inertia, multiply(dcm_bn, environment.r_n)))
+    if p.aerodynamic and density > 0.0:
+        velocity_b = multiply(dcm_bn, air_velocity(environment.r_n, environment.v_n))
+        torque = add(torque, aerodynamic_torque(p.panels, p.drag_coefficient, velocity_b, density))
+    if p.solar_pressure and environment.illumination > 0.0:
+        pressure = SOLAR_PRESSURE * environment.solar_flux * environment.illumination
+        sun_b = multiply(dcm_bn, environment.sun_n)
+        torque = add(torque, solar_pressure_torque(p.panels, p.specular, p.diffuse, sun_b, pressure))
+    m = p.dipole_b
+    if m[0] != 0.0 or m[1] != 0.0 or m[2] != 0.0:
+        torque = add(torque, cross(m, multiply(dcm_bn, environment.field_n)))
+    return torque
