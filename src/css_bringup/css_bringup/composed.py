@@ -13,7 +13,7 @@ from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.plant_host import PlantNode
-from css_common.run import create_node
+from css_common.node_process import create_node
 from css_recording.recorder import RecorderNode
 
 _PROGRESS_EVERY = 0.2

@@ -55,8 +55,17 @@ def cache_folder() -> Path:
     return base / "kernels" / kernel_source_hash()
 
 
-if "NUMBA_CACHE_DIR" not in os.environ:
-    numba.config.CACHE_DIR = str(cache_folder())
+def _use_cache_folder() -> None:
+    # Numba reads its environment anew whenever any NUMBA_ variable changes, so the folder must stand there and not
+    # only in its configuration. A child process inherits it but may find edited sources: it names its own.
+    chosen_by_us = os.environ.get("SUNPOINT_KERNEL_CACHE")
+    if os.environ.get("NUMBA_CACHE_DIR") in (None, chosen_by_us):
+        folder = str(cache_folder())
+        os.environ["NUMBA_CACHE_DIR"] = os.environ["SUNPOINT_KERNEL_CACHE"] = folder
+        numba.config.CACHE_DIR = folder
+
+
+_use_cache_folder()
 
 kernel = numba.njit(cache=True, error_model="numpy", fastmath=False)
 """Compiles a pure function on scalars, tuples and small arrays; `kernel_function.py_func` is the plain Python."""

@@ -1,137 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`main` of every node executable: command line, mission, ROS start, clean end."""
+"""`main` of every node file. rclpy is loaded only when a node really runs: studies read node files without it."""
 
-import json
-import signal
 import sys
 from collections.abc import Callable
-from pathlib import Path
 
-import rclpy
-from rclpy.executors import ExternalShutdownException
-
-from css_common.component import Component, Plant
-from css_common.executor import create_executor, spin_until
-from css_common.host import ComponentNode
-from css_common.mission import Mission, find_component, mission_from_text
-from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
-from css_common.plant_host import PlantNode
-from css_common.schema import ParameterError, default_values
-from css_common.sections import GRAPH
-
-USAGE_ERROR = 2
+from css_common.component import Component
+from css_common.mission import find_component
 
 
 def node_main(component_type: type[Component]) -> Callable[[], int]:
     """The `main` of a node file: `main = node_main(Gyro)`."""
-    package, _, executable = component_type.__module__.partition(".nodes.")
 
     def main(args: list[str] | None = None) -> int:
-        arguments = sys.argv[1:] if args is None else args
-        # run as a script the module is called __main__; the imported one is the class that missions refer to
-        component = find_component(package, executable) if package != "__main__" else component_type
-        if "-h" in arguments or "--help" in arguments:
-            print(describe(component))
-            return 0
-        return run_node(component, arguments)
+        from css_common import node_process
+
+        module = component_type.__module__
+        if module == "__main__":  # python -m PACKAGE.nodes.NAME: the imported class is the one that missions refer to
+            module = sys.modules["__main__"].__spec__.name
+        package, _, executable = module.partition(".nodes.")
+        return node_process.main(find_component(package, executable), sys.argv[1:] if args is None else args)
 
     return main
-
-
-def create_node(component_type: type[Component], name: str, mission: Mission, **options) -> ComponentNode:
-    """The host that fits a component."""
-    host = PlantNode if issubclass(component_type, Plant) else ComponentNode
-    return host(component_type, name, mission, **options)
-
-
-def run_node(component_type: type[Component], arguments: list[str]) -> int:
-    """Runs one node until it is told to stop; 0 on a clean end, 1 when it failed, 2 on bad parameters.
-
-    `--summary FILE` before `--ros-args` leaves the figures of the run in a JSON file at its end.
-    """
-    executable = component_type.__module__.rpartition(".")[2]
-    node = None
-    summary = None
-    if "--summary" in arguments[:-1]:
-        at = arguments.index("--summary")
-        summary = Path(arguments[at + 1])
-        arguments = arguments[:at] + arguments[at + 2 :]
-    try:
-        mission = mission_of_arguments(component_type, arguments)
-        rclpy.init(args=[sys.argv[0], *arguments])
-        executor = create_executor()
-        node = create_node(component_type, executable, mission)
-        executor.add_node(node)
-        if not node.start():
-            return USAGE_ERROR
-        plant = node if isinstance(node, PlantNode) else None
-        spin_until(executor, lambda: plant is not None and plant.done)
-        if plant is not None and plant.failed:
-            return 1
-    except (MissionError, ParameterError) as error:
-        print(f"{executable}: {error}", file=sys.stderr)
-        return USAGE_ERROR
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C must not tear the clean-up apart
-        if node is not None:
-            if summary is not None:
-                summary.write_text(json.dumps(node.summary()), encoding="utf-8")
-            node.finish()
-            node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
-
-
-def mission_of_arguments(component_type: type[Component], arguments: list[str]) -> Mission:
-    """The mission in the parameter files of a command line, later files over earlier ones; defaults without any.
-
-    Raises:
-        MissionError: a file is missing or wrong.
-    """
-    files = [b for a, b in zip(arguments, arguments[1:], strict=False) if a == "--params-file"]
-    parameters: dict[str, dict] = {}
-    for file in files:
-        try:
-            with open(file, encoding="utf-8") as stream:
-                text = stream.read()
-        except (OSError, UnicodeDecodeError) as error:
-            raise MissionError(f"{file}: cannot be read: {error}") from error
-        for section, nested in read_sections(text, file).items():
-            parameters.setdefault(section, {}).update(flattened(nested))
-    package, _, executable = component_type.__module__.partition(".nodes.")
-    name = executable
-    for argument in arguments:
-        name = argument.removeprefix("__node:=") if argument.startswith("__node:=") else name
-    shared = parameters.setdefault("/**", {})
-    if "graph.nodes" not in shared:
-        # a file for this node alone: the graph is the default one, with this node in it
-        nodes = default_values(GRAPH).graph.nodes
-        if not any(entry.partition(":")[2] or entry.rpartition("/")[2] == name for entry in nodes):
-            shared["graph.nodes"] = [*nodes, f"{package}/{executable}:{name}"]
-    return mission_from_text(dump_sections(parameters), ", ".join(files) or "defaults")
-
-
-def describe(component_type: type[Component]) -> str:
-    """Help text of a node: purpose, topics, parameters with unit, range and default."""
-    package, _, name = component_type.__module__.partition(".nodes.")
-    values = default_values(component_type.table())
-    lines = [f"ros2 run {package} {name} [--ros-args --params-file MISSION.yaml ...]", ""]
-    lines += [(component_type.__doc__ or "").strip(), "", "Subscribes:"]
-    lines += [
-        f"  {i.topic}  {i.message_type.__module__.split('.')[0]}/msg/{i.message_type.__name__}"
-        + ("" if i.required else "  (optional)")
-        for i in component_type.inputs(name, values)
-    ] or ["  nothing"]
-    lines += ["", "Publishes:"]
-    lines += [
-        f"  {o.topic}  {o.message_type.__module__.split('.')[0]}/msg/{o.message_type.__name__}"
-        for o in component_type.outputs(name, values)
-    ]
-    lines += ["  /diagnostics  diagnostic_msgs/msg/DiagnosticArray", "", "Parameters (* may change in flight):"]
-    for p in component_type.table():
-        default = p.default if not (p.is_array and len(p.default) > 6) else f"{len(p.default)} values"
-        lines.append(f"  {'*' if p.tunable else ' '}{p.name} = {default}")
-        lines.append(f"      {p.description}; {p.expectation()}")
-    return "\n".join(lines)
