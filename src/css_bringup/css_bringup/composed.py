@@ -5,6 +5,7 @@ import gc
 import time
 from pathlib import Path
 
+from css_recording.recorder import RecorderNode
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
@@ -12,9 +13,8 @@ from css_bringup.flight import FlightResult, Progress
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
-from css_common.plant_host import PlantNode
 from css_common.node_process import create_node
-from css_recording.recorder import RecorderNode
+from css_common.plant_host import PlantNode
 
 _PROGRESS_EVERY = 0.2
 

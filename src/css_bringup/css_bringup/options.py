@@ -22,7 +22,9 @@ errors = Console(stderr=True, highlight=False)
 
 def add_mission_options(parser: argparse.ArgumentParser) -> None:
     """Mission name and what may be changed in it."""
-    parser.add_argument("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
+    parser.add_argument(
+        "mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)"
+    )
     parser.add_argument("--case", type=int, metavar="K", help="case number: initial state and noise are drawn for it")
     parser.add_argument("--seed", type=int, metavar="N", help="key of all random streams")
     parser.add_argument("--duration", type=float, metavar="S", help="simulated time to fly [s]")

@@ -185,7 +185,9 @@ class Supervisor:
         self._folder.cleanup()
 
     def _fail(self, child: Child, code: int, consequence: str) -> None:
-        self.failure = f"{child.name} died ({_cause(code)}), {consequence}; its log {child.log} ends:\n{child.log_tail()}"
+        self.failure = (
+            f"{child.name} died ({_cause(code)}), {consequence}; its log {child.log} ends:\n{child.log_tail()}"
+        )
 
 
 def _cause(code: int) -> str:

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Launches the nodes of a mission: ros2 launch css_bringup mission.launch.py mission:=okeefe_2013."""
 
-from launch import LaunchContext, LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
 from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
@@ -9,6 +8,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
 from css_common.mission import find_mission, load_mission
+from launch import LaunchContext, LaunchDescription
 
 
 def _nodes(context: LaunchContext) -> list:

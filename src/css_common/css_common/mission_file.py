@@ -40,7 +40,7 @@ def read_sections(text: str, origin: str) -> dict[str, dict[str, Any]]:
     """
     try:
         # SafeLoader subclass: builds plain data only
-        document = yaml.load(text, _Loader)  # noqa: S506
+        document = yaml.load(text, _Loader)
     except MissionError as error:
         raise MissionError(f"{origin}: {error}") from error
     except yaml.YAMLError as error:

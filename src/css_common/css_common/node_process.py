@@ -4,6 +4,7 @@
 import json
 import signal
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import rclpy
@@ -81,7 +82,7 @@ def mission_of_arguments(component_type: type[Component], arguments: list[str]) 
     Raises:
         MissionError: a file is missing or wrong.
     """
-    files = [b for a, b in zip(arguments, arguments[1:], strict=False) if a == "--params-file"]
+    files = [b for a, b in pairwise(arguments) if a == "--params-file"]
     parameters: dict[str, dict] = {}
     for file in files:
         try:

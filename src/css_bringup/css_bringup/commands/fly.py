@@ -30,7 +30,7 @@ def _parser() -> argparse.ArgumentParser:
         "--realtime", type=float, nargs="?", const=1.0, metavar="FACTOR",
         help="pace against the wall clock (default factor 1.0)",
     )  # fmt: skip
-    parser.add_argument("--no-record", action="store_true", help="fly without a recording (and without figures of merit)")
+    parser.add_argument("--no-record", action="store_true", help="fly without a recording and figures of merit")
     add_output_options(parser)
     return parser
 

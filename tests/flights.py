@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Short flights that several tests share."""
+
+from collections import defaultdict
+from pathlib import Path
+
+from css_bringup.composed import ComposedFlight
+from css_bringup.flight import FlightResult
+from css_common.codec import Sample, codec_of
+from css_common.mission import Mission, load_mission
+from css_recording.bag_reader import BagReader
+
+MISSION = "okeefe_2013"
+
+
+def short_mission(duration: float, *overrides: str) -> Mission:
+    """The O'Keefe mission, cut to `duration` seconds."""
+    return load_mission(MISSION, [f"mission.duration={duration}", *overrides])
+
+
+def fly_composed(mission: Mission, bag: Path | None) -> FlightResult:
+    """Flies a mission in this process."""
+    with ComposedFlight(mission, bag) as flight:
+        return flight.fly()
+
+
+def messages_by_topic(bag: Path) -> dict[str, list[tuple[int, bytes]]]:
+    """Stamps and bytes of every topic of a recording."""
+    messages: dict[str, list[tuple[int, bytes]]] = defaultdict(list)
+    with BagReader(bag) as reader:
+        for message in reader.messages():
+            messages[message.topic].append((message.stamp_ns, message.data))
+    return dict(messages)
+
+
+def samples(bag: Path, topic: str, message_type: type) -> list[Sample]:
+    """Decoded messages of one topic."""
+    codec = codec_of(message_type)
+    with BagReader(bag) as reader:
+        return [codec.decode(message.data) for message in reader.messages([topic])]

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One process per node: the same numbers as composed, restarts after a death, an end with a log after the second."""
+
+import os
+import signal
+
+from flights import fly_composed, messages_by_topic, short_mission
+
+from css_bringup.processes import fly_processes
+
+
+def test_processes_and_composed_agree_sample_by_sample(tmp_path):
+    mission = short_mission(20.0)
+    assert fly_composed(mission, tmp_path / "composed").messages_lost == 0
+    result = fly_processes(mission, tmp_path / "processes", tmp_path / "logs")
+    assert result.failure == ""
+    assert result.messages_lost == 0
+    composed = messages_by_topic(tmp_path / "composed")
+    separate = messages_by_topic(tmp_path / "processes")
+    for topic in mission.topics:
+        assert separate[f"/{topic}"] == composed[f"/{topic}"], topic
+
+
+class _Killer:
+    """Kills a node once the flight is under way, and again after each restart, `times` in all."""
+
+    def __init__(self, name: str, times: int, bag) -> None:
+        self.name, self.left, self.bag = name, times, bag
+        self.killed: set[int] = set()
+
+    def __call__(self, supervisor) -> None:
+        child = supervisor.children[self.name]
+        flying = any(self.bag.glob("*.mcap")) and sum(f.stat().st_size for f in self.bag.glob("*.mcap")) > 50_000
+        if self.left and flying and child.process.pid not in self.killed and child.poll() is None:
+            self.killed.add(child.process.pid)
+            os.kill(child.process.pid, signal.SIGKILL)
+            self.left -= 1
+
+
+def test_a_node_that_dies_is_restarted_and_the_flight_goes_on(tmp_path):
+    mission = short_mission(60.0)
+    bag = tmp_path / "bag"
+    result = fly_processes(mission, bag, tmp_path / "logs", _Killer("ekf", 1, bag))
+    assert result.failure == ""
+    assert result.steps == 600
+    assert result.notes == ["ekf died (SIGKILL) and was restarted"]
+    stamps = [stamp for stamp, _ in messages_by_topic(bag)["/truth"]]
+    assert stamps == [mission.epoch_ns + k * mission.period_ns for k in range(600)]
+
+
+def test_a_restarted_sensor_gives_the_numbers_it_would_have_given(tmp_path):
+    mission = short_mission(60.0)
+    fly_composed(mission, tmp_path / "composed")
+    bag = tmp_path / "bag"
+    result = fly_processes(mission, bag, tmp_path / "logs", _Killer("gyro", 1, bag))
+    assert result.notes == ["gyro died (SIGKILL) and was restarted"]
+    assert messages_by_topic(bag)["/truth"] == messages_by_topic(tmp_path / "composed")["/truth"]
+
+
+def test_the_second_death_ends_the_run_with_the_log(tmp_path):
+    bag = tmp_path / "bag"
+    result = fly_processes(short_mission(5000.0), bag, tmp_path / "logs", _Killer("ekf", 2, bag))
+    assert "ekf died (SIGKILL), for the second time within 60 s" in result.failure
+    assert "ekf.log" in result.failure
+    # the recording up to there is complete
+    assert messages_by_topic(bag)["/truth"]
+
+
+def test_without_the_plant_the_run_ends(tmp_path):
+    bag = tmp_path / "bag"
+    result = fly_processes(short_mission(5000.0), bag, tmp_path / "logs", _Killer("dynamics", 1, bag))
+    assert "dynamics died (SIGKILL), the spacecraft's state is lost with it" in result.failure
+
+
+def test_a_killed_recorder_ends_the_run_and_its_recording_is_recovered(tmp_path):
+    from css_recording.recovery import recover
+
+    bag = tmp_path / "bag"
+
+    class KillRecorder(_Killer):
+        def __call__(self, supervisor) -> None:
+            supervisor.children.setdefault("recorder", supervisor.recorder)
+            super().__call__(supervisor)
+            del supervisor.children["recorder"]
+
+    mission = short_mission(5000.0)
+    result = fly_processes(mission, bag, tmp_path / "logs", KillRecorder("recorder", 1, bag))
+    assert "recorder died (SIGKILL), the flight is not recorded any more" in result.failure
+    recover(bag)
+    recovered = messages_by_topic(bag)
+    counts = {topic: len(recovered[f"/{topic}"]) for topic in mission.topics}
+    assert min(counts.values()) > 10
+    # whole simulated seconds, of all topics alike
+    assert max(counts.values()) - min(counts.values()) <= 10
