@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An edited kernel is compiled anew everywhere, also in callers that live in other files and were cached.
+
+Each test works on a copy of the decorator beside two small packages of kernels, in processes of their own.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import css_common.kernel
+
+INNER = "from css_common.kernel import kernel\n@kernel\ndef inner(x):\n    return x + {}\n"
+OUTER = (
+    "from css_common.kernel import kernel\nfrom css_environment.inner import inner\n"
+    "@kernel\ndef outer(x):\n    return 10.0 * inner(x)\n"
+)
+PROGRAM = """
+import json, os, sys
+{before}
+from css_sim.outer import outer
+result = outer(1.0)
+hits = sum(outer.stats.cache_hits.values())
+print(json.dumps(dict(result=result, hits=hits, folder=outer.stats.cache_path)))
+"""
+
+
+class Project:
+    """A tree with the decorator and two kernels, one calling the other from another package."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.home = root / "home"
+        for package in ("css_common", "css_environment", "css_sim", "css_sim/nodes"):
+            (root / package).mkdir()
+            (root / package / "__init__.py").touch()
+        shutil.copy(css_common.kernel.__file__, root / "css_common")
+        self.write_inner("1.0")
+        (root / "css_sim" / "outer.py").write_text(OUTER)
+
+    def write_inner(self, term: str) -> None:
+        """Edits the kernel that is called."""
+        (self.root / "css_environment" / "inner.py").write_text(INNER.format(term))
+
+    def run(self, before: str = "", **environment: str) -> dict:
+        """Calls the outer kernel in a fresh process: result, cache hits and cache folder."""
+        ours = ("NUMBA_", "SUNPOINT_", "PYTHON", "XDG_")
+        env = {key: value for key, value in os.environ.items() if not key.startswith(ours)}
+        env |= {"PYTHONPATH": str(self.root), "SUNPOINT_HOME": str(self.home), **environment}
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM.format(before=before)], env=env, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return json.loads(done.stdout)
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A fresh project without any cache."""
+    return Project(tmp_path)
+
+
+def test_second_start_compiles_nothing(project):
+    first, second = project.run(), project.run()
+    assert first["result"] == second["result"] == 20.0
+    assert (first["hits"], second["hits"]) == (0, 1)
+    assert first["folder"] == second["folder"]
+
+
+def test_edit_in_another_file_reaches_a_cached_caller(project):
+    before = project.run()
+    project.write_inner("2.0")
+    after = project.run()
+    assert (before["result"], after["result"]) == (20.0, 30.0)
+    assert before["folder"] != after["folder"]
+    project.write_inner("1.0")
+    assert project.run() == before | {"hits": 1}, "the old cache serves the old sources again"
+
+
+def test_the_trap_is_real(project):
+    # One folder for all sources, as numba has it by default: the caller keeps what it once compiled. When this
+    # fails, numba checks the files of callees too and the folder needs no hash any more.
+    fixed = {"NUMBA_CACHE_DIR": str(project.root / "fixed")}
+    assert project.run(**fixed)["result"] == 20.0
+    project.write_inner("2.0")
+    assert project.run(**fixed)["result"] == 20.0
+
+
+def test_folder_chosen_by_the_user_is_used(project):
+    chosen = project.root / "chosen"
+    assert Path(project.run(NUMBA_CACHE_DIR=str(chosen))["folder"]).is_relative_to(chosen)
+
+
+def test_child_that_finds_edited_sources_does_not_inherit_the_folder(project):
+    parent = project.run()
+    project.write_inner("2.0")
+    folder = str(Path(parent["folder"]).parent)
+    child = project.run(NUMBA_CACHE_DIR=folder, SUNPOINT_KERNEL_CACHE=folder)
+    assert child["result"] == 30.0
+    assert child["folder"] != parent["folder"]
+
+
+def test_change_of_a_numba_variable_does_not_move_the_cache(project):
+    # numba reads its whole environment again at the next compilation
+    meddle = (
+        "import css_common.kernel, numba, os\n"
+        "os.environ['NUMBA_DISABLE_PERFORMANCE_WARNINGS'] = '1'\n"
+        "numba.njit(lambda x: x)(1.0)"
+    )
+    assert Path(project.run(before=meddle)["folder"]).is_relative_to(project.home)
+
+
+def test_only_files_that_can_hold_kernels_name_the_folder(project):
+    before = project.run()
+    for path in ("css_sim/nodes/array.py", "css_sim/data/table.py", "css_sim/test/test_x.py"):
+        file = project.root / path
+        file.parent.mkdir(exist_ok=True)
+        file.write_text("x = 1\n")
+    assert project.run()["folder"] == before["folder"]
+    (project.root / "css_sim" / "other.py").touch()
+    assert project.run()["folder"] != before["folder"]
+
+
+def test_without_a_project_the_users_cache_is_taken(project):
+    folder = project.run(SUNPOINT_HOME="", XDG_CACHE_HOME=str(project.root / "xdg"))["folder"]
+    assert Path(folder).is_relative_to(project.root / "xdg" / "sunpoint" / "kernels")
