@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Switching the gyro off and on in flight, by an event of the mission and by a lifecycle request."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from flights import fly_composed, messages_by_topic, samples, short_mission
@@ -10,6 +12,7 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu
 
 from css_bringup.composed import ComposedFlight
+from css_common.mission import find_mission, mission_from_text
 from css_msgs.msg import SunEstimate
 
 EVENTS = """
@@ -21,8 +24,6 @@ EVENTS = """
 
 @pytest.fixture
 def scripted(tmp_path):
-    from css_common.mission import find_mission, mission_from_text
-
     text = find_mission("okeefe_2013").read_text().replace("    criteria:", EVENTS + "    criteria:")
     return mission_from_text(text, "scripted", ["mission.duration=60.0"])
 
@@ -71,7 +72,7 @@ def test_lifecycle_request_from_another_node(tmp_path):
         flight.executor.remove_node(operator)
         operator.destroy_node()
     source = [s.rate_source for s in samples(tmp_path / "bag", "/ekf/sun_estimate", SunEstimate)]
-    changes = [source[0], *(b for a, b in zip(source, source[1:], strict=False) if b != a)]
+    changes = [source[0], *(b for a, b in pairwise(source) if b != a)]
     used = [c for c in changes if c != SunEstimate.RATE_NONE]
     assert used[0] == SunEstimate.RATE_GYRO
     assert SunEstimate.RATE_SUN in used

@@ -7,6 +7,7 @@ import signal
 from flights import fly_composed, messages_by_topic, short_mission
 
 from css_bringup.processes import fly_processes
+from css_recording.recovery import recover
 
 
 def test_processes_and_composed_agree_sample_by_sample(tmp_path):
@@ -73,8 +74,6 @@ def test_without_the_plant_the_run_ends(tmp_path):
 
 
 def test_a_killed_recorder_ends_the_run_and_its_recording_is_recovered(tmp_path):
-    from css_recording.recovery import recover
-
     bag = tmp_path / "bag"
 
     class KillRecorder(_Killer):

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The composed environment, and the choice between ROS wheels and a sourced installation."""
 
+import sys
 from pathlib import Path
 
 import pytest
+
 from bootstrap.environment import changes, compose, ros_source, toolchain, without_other_sunpoint
 from bootstrap.project import Environment, Project, Refusal
 from bootstrap.requirements import blocks, for_system
@@ -32,8 +34,6 @@ def test_other_distributions_are_refused():
 
 
 def test_wheels_environment_needs_no_second_start_of_python(tmp_path):
-    import sys
-
     version = f"python{sys.version_info[0]}.{sys.version_info[1]}"
     bundled = tmp_path / ".venv" / "lib" / version / "site-packages" / "ros_rcl.libs"
     bundled.mkdir(parents=True)
@@ -103,11 +103,8 @@ def test_system_installation_brings_ros_and_numpy_itself():
 
 
 def test_filtered_lock_keeps_every_hash_of_what_remains():
-    lock = "a==1 \\\n    --hash=sha256:1 \\\n    --hash=sha256:2\nros-b==1 \\\n    --hash=sha256:3\nc==2 ; x < '3' \\\n    --hash=sha256:4\n"
-    assert for_system(lock, has_colcon=True).splitlines() == [
-        "a==1 \\",
-        "    --hash=sha256:1 \\",
-        "    --hash=sha256:2",
-        "c==2 ; x < '3' \\",
-        "    --hash=sha256:4",
-    ]
+    a = ["a==1 \\", "    --hash=sha256:1 \\", "    --hash=sha256:2"]
+    ros = ["ros-b==1 \\", "    --hash=sha256:3"]
+    c = ["c==2 ; x < '3' \\", "    --hash=sha256:4"]
+    lock = "\n".join(["# a comment", *a, *ros, "# another", *c, ""])
+    assert for_system(lock, has_colcon=True).splitlines() == [*a, *c]

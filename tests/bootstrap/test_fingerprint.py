@@ -2,6 +2,7 @@
 """Which changes ask for an installation or a build, and which must not."""
 
 import pytest
+
 from bootstrap import fingerprint
 from bootstrap.plan import find_need
 from bootstrap.project import Environment, Project, State

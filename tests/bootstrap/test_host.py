@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+
 from bootstrap import host
 from bootstrap.project import Refusal
 

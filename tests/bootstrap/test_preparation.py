@@ -10,6 +10,7 @@ import textwrap
 import time
 
 import pytest
+
 from bootstrap import build as building
 from bootstrap import workspace
 from bootstrap.plan import Need
@@ -77,7 +78,7 @@ START = """
 
     def install(work):
         with Step("pretending") as step:
-            run(step, ["sh", "-c", "(sleep 30; touch late) & sleep {seconds}"], {{"PATH": "/usr/bin:/bin"}}, {root!r},
+            run(step, ["sh", "-c", {command!r}], {{"PATH": "/usr/bin:/bin"}}, {root!r},
                 work.log("x.log"))
         done.write_text(done.read_text() + "x" if done.exists() else "x")
 
@@ -90,9 +91,9 @@ START = """
 """
 
 
-def start(project, seconds):
+def start(project, command):
     tools = os.path.dirname(os.path.dirname(workspace.__file__))
-    code = textwrap.dedent(START).format(tools=tools, root=str(project.root), seconds=seconds)
+    code = textwrap.dedent(START).format(tools=tools, root=str(project.root), command=command)
     return subprocess.Popen([sys.executable, "-I", "-S", "-c", code], stderr=subprocess.PIPE, text=True)
 
 
@@ -109,9 +110,9 @@ def running(process):
 
 
 def test_second_start_waits_and_finds_everything_done(project):
-    first = start(project, 0.6)
+    first = start(project, "sleep 0.6")
     wait_for(running(first))
-    second = start(project, 0.6)
+    second = start(project, "sleep 0.6")
     assert "waiting" in second.stderr.readline()
     assert (first.wait(10), second.wait(10)) == (0, 0)
     assert (project.root / "done").read_text() == "x"
@@ -119,7 +120,7 @@ def test_second_start_waits_and_finds_everything_done(project):
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interruption_stops_everything_that_was_started(project, number):
-    process = start(project, 30)
+    process = start(project, "sleep 30 & sleep 30")
     wait_for(running(process))
     time.sleep(0.2)
     began = time.monotonic()
@@ -129,7 +130,7 @@ def test_interruption_stops_everything_that_was_started(project, number):
     assert time.monotonic() - began < 5
     assert not (project.root / "done").exists()
     # The lock is free again, so nothing of it is left behind.
-    assert start(project, 0).wait(10) == 0
+    assert start(project, "true").wait(10) == 0
 
 
 def fake_colcon(project, results):

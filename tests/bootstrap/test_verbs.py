@@ -2,6 +2,7 @@
 """The verbs: help, unknown names, and that each names an executable of a package."""
 
 import pytest
+
 from bootstrap.cli import main
 from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
 

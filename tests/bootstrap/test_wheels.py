@@ -4,6 +4,7 @@
 import os
 
 import pytest
+
 from bootstrap.wheels import mend_cmake_files
 
 EXPORT = """set_target_properties(std_msgs::gen_py PROPERTIES

@@ -9,6 +9,7 @@ nobody declares, so each reader checks the whole file here first and a typo dies
 import importlib
 import os
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -302,18 +303,13 @@ class Mission:
                 )
 
 
-class _naming:
-    """Context that puts file and section in front of what is wrong."""
-
-    def __init__(self, origin: str, section: str) -> None:
-        self.place = f"{origin}: {section}"
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: Any) -> None:
-        if isinstance(error, ParameterError):
-            raise MissionError(f"{self.place}: {error}") from error
+@contextmanager
+def _naming(origin: str, section: str) -> Iterator[None]:
+    """Puts file and section in front of what is wrong."""
+    try:
+        yield
+    except ParameterError as error:
+        raise MissionError(f"{origin}: {section}: {error}") from error
 
 
 def _refuse(conflicts: Iterable[str]) -> None:
