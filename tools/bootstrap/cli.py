@@ -11,7 +11,7 @@ from pathlib import Path
 from bootstrap.environment import compose, ros_source, without_other_sunpoint
 from bootstrap.plan import find_need
 from bootstrap.project import Project, Refusal, State
-from bootstrap.verbs import VERBS, help_text, unknown_verb
+from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
 
 
 def main(arguments: list[str]) -> int:
@@ -23,6 +23,9 @@ def main(arguments: list[str]) -> int:
     if verb not in VERBS:
         print(unknown_verb(verb), file=sys.stderr)
         return 2
+    if verb in OWN_USAGE and rest[:1] in (["-h"], ["--help"]):
+        print(OWN_USAGE[verb])
+        return 0
     project = Project(Path(__file__).resolve().parents[2])
     try:
         return _start(project, verb, rest)

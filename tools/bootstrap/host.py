@@ -14,7 +14,17 @@ from pathlib import Path
 from bootstrap.environment import SYSTEM
 from bootstrap.project import Refusal
 
+OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
 OLDEST_GLIBC = (2, 28)  # manylinux_2_28, what the ROS wheels are built for
+
+
+def check_python_version() -> None:
+    """Raises Refusal when an operating system upgrade has changed the Python below `.venv` to an unknown one."""
+    if not OLDEST_PYTHON <= sys.version_info[:2] <= NEWEST_PYTHON:
+        raise Refusal(
+            f"the Python of .venv has become {sys.version.split()[0]}; ROS packages exist for 3.11 to 3.13",
+            "rm -r .venv   and run it again; it then looks for a suitable python3",
+        )
 
 
 def check_compiler(env: Mapping[str, str]) -> None:
@@ -91,6 +101,7 @@ def check_folder(root: Path) -> None:
 
 def check(root: Path, ros: str, env: Mapping[str, str]) -> None:
     """Raises Refusal naming the first thing that is missing."""
+    check_python_version()
     check_folder(root)
     if ros == SYSTEM:
         system_python(env)

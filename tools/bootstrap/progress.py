@@ -129,7 +129,7 @@ def run(step: Step, command: Sequence[str | Path], env: Mapping[str, str], cwd: 
 
 
 def _stop(process: subprocess.Popen[bytes]) -> None:
-    """End a command with everything it started, and wait for it; firmly when it does not listen."""
+    """End a command with everything it started: asked first, then whatever is left by force."""
     for number in (signal.SIGINT, signal.SIGKILL):
         with contextlib.suppress(ProcessLookupError, subprocess.TimeoutExpired):
             os.killpg(process.pid, number)

@@ -46,6 +46,22 @@ Usage: ./sunpoint VERB [ARGUMENTS]
 ./sunpoint VERB --help explains one verb."""
 
 
+OWN_USAGE = {
+    "test": """Usage: ./sunpoint test [PYTEST ARGUMENTS]
+
+Runs ruff, mypy and pytest with message type checks on, and fails if any of them does. Examples:
+  ./sunpoint test -n 2                             tests on two processors
+  ./sunpoint test src/css_common/test -k attitude  some tests
+All options: ./sunpoint shell -c 'pytest --help'""",
+    "shell": """Usage: ./sunpoint shell [-c COMMAND | BASH ARGUMENTS]
+
+Opens bash with the environment that the verbs run in: ros2, colcon, python and every built package.
+With -c it runs one command and ends with its exit code. Message type checks are on; for timed runs
+switch them off with ROS_PYTHON_CHECK_FIELDS=0.""",
+}
+"""Help of the verbs that have no executable to give it."""
+
+
 def unknown_verb(name: str) -> str:
     """The message for a verb that does not exist, with the nearest one that does."""
     import difflib  # only a mistyped verb pays for this import
