@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a recorder does with each message: its stamp, its place in the recording, the gaps before it. No ROS here.
+
+Log time is the stamp of the message's own header, so that a recording of simulated time is in simulated time. A
+message without a stamp gets the latest one that was seen.
+"""
+
+import struct
+import time
+from collections import Counter
+from collections.abc import Mapping
+
+from css_recording.bag_metadata import Topic
+from css_recording.bag_writer import BagWriter
+from css_recording.schemas import dependencies, schema_of
+
+_STAMP = struct.Struct("<iI")
+_STAMPED_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+# Their stamps are of the wall clock, also where everything else is in simulated time.
+_WALL_CLOCK_TOPICS = ("/parameter_events", "/rosout")
+_MOST_HELD = 1000
+
+
+def is_stamped(topic: Topic) -> bool:
+    """Whether messages begin with a stamp (a Header or a Time) that tells the time of the flight."""
+    if topic.name in _WALL_CLOCK_TOPICS:
+        return False
+    text = (topic.schema or schema_of(topic.type)).text
+    for line in text.splitlines():
+        if line.split("#", 1)[0].strip():
+            return dependencies(topic.type, line)[:1] in ([name] for name in _STAMPED_FIRST)
+    return False
+
+
+class FlightRecorder:
+    """Files messages as they arrive.
+
+    Attributes:
+        writer: the recording.
+        counters: messages received with `gaps` (stamps missing before them), `repeated` or `back` (stamps that do
+            not go forward) and `unstamped` (no stamp of their own, or none that can be).
+    """
+
+    def __init__(self, writer: BagWriter, spacing_ns: Mapping[str, int] | None = None) -> None:
+        """Takes over a recording.
+
+        Args:
+            writer: where messages go; closing it is the caller's.
+            spacing_ns: time from stamp to stamp of topics that have a fixed one; only there gaps are counted.
+        """
+        self.writer = writer
+        self.counters: Counter[str] = Counter()
+        self._spacing_ns = dict(spacing_ns or {})
+        self._stamped = {topic.name: is_stamped(topic) for topic in writer.topics}
+        self._last_ns: dict[str, int] = {}
+        self._latest_ns: int | None = None
+        self._held: list[tuple[str, bytes, int]] = []
+        self._received: Counter[str] = Counter({topic.name: 0 for topic in writer.topics})
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Messages received of each topic."""
+        return dict(self._received)
+
+    @property
+    def message_count(self) -> int:
+        """Messages received."""
+        return self._received.total()
+
+    def add_topic(self, topic: Topic) -> None:
+        """Makes a topic known."""
+        self.writer.add_topic(topic)
+        self._stamped[topic.name] = is_stamped(topic)
+        self._received[topic.name] += 0
+
+    def receive(self, topic: str, data: bytes) -> None:
+        """Files one serialised message.
+
+        Raises:
+            BagError: the recording cannot be written any more.
+        """
+        self._received[topic] += 1
+        if not self._stamped[topic] or len(data) < 12:
+            self._file_unstamped(topic, data)
+            return
+        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        stamp_ns = seconds * 1_000_000_000 + nanoseconds
+        if stamp_ns <= 0:  # a driver that leaves its header empty
+            self._file_unstamped(topic, data)
+            return
+        last_ns = self._last_ns.get(topic)
+        self._last_ns[topic] = stamp_ns
+        if last_ns is not None and topic in self._spacing_ns and stamp_ns - last_ns != self._spacing_ns[topic]:
+            self._count_step(topic, stamp_ns - last_ns)
+        if self._latest_ns is None or stamp_ns > self._latest_ns:
+            self._latest_ns = stamp_ns
+            if self._held:
+                self._release(stamp_ns)
+        self.writer.write(topic, stamp_ns, data)
+
+    def close(self) -> None:
+        """Finishes the recording."""
+        if not self.writer.closed:
+            self._release(None)
+        self.writer.close()
+
+    def _count_step(self, topic: str, step_ns: int) -> None:
+        if step_ns > self._spacing_ns[topic]:
+            self.counters["gaps"] += 1
+        else:
+            self.counters["repeated" if step_ns == 0 else "back"] += 1
+
+    def _file_unstamped(self, topic: str, data: bytes) -> None:
+        """Files at the latest stamp. Before there is one, messages wait; too many get the wall clock's."""
+        self.counters["unstamped"] += 1
+        if self._latest_ns is not None:
+            self.writer.write(topic, self._latest_ns, data)
+            return
+        self._held.append((topic, data, time.time_ns()))
+        if len(self._held) > _MOST_HELD:
+            self._latest_ns = self._held[-1][2]
+            self._release(None)
+
+    def _release(self, stamp_ns: int | None) -> None:
+        """Files what waits, at a stamp or at the instants of the wall clock at which it came."""
+        held, self._held = self._held, []
+        for topic, data, received_ns in held:
+            self.writer.write(topic, received_ns if stamp_ns is None else stamp_ns, data)

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Topics of the live graph in the words of a recording, and back."""
+
+import importlib
+from collections.abc import Iterable
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from css_recording.bag_metadata import QosProfile
+from css_recording.errors import BagError
+from css_recording.schemas import split_type_name
+
+_RELIABILITY = {ReliabilityPolicy.RELIABLE: "reliable", ReliabilityPolicy.BEST_EFFORT: "best_effort"}
+_DURABILITY = {DurabilityPolicy.TRANSIENT_LOCAL: "transient_local", DurabilityPolicy.VOLATILE: "volatile"}
+_HISTORY = {HistoryPolicy.KEEP_LAST: "keep_last", HistoryPolicy.KEEP_ALL: "keep_all"}
+
+
+def type_name_of(message_class: type) -> str:
+    """Full name, "css_msgs/msg/CssVoltages", of a message class."""
+    return f"{message_class.__module__.split('.')[0]}/msg/{message_class.__name__}"
+
+
+def message_class_of(type_name: str) -> type:
+    """Message class of a full type name.
+
+    Raises:
+        BagError: the type is not installed.
+    """
+    package, name = split_type_name(type_name)
+    try:
+        found = getattr(importlib.import_module(f"{package}.msg"), name)
+    except (ImportError, AttributeError) as error:
+        raise BagError(f"message type {type_name} is not installed") from error
+    assert isinstance(found, type)
+    return found
+
+
+def recorded_qos(profile: QoSProfile) -> QosProfile:
+    """A quality of service as a recording says it."""
+    return QosProfile(
+        _RELIABILITY.get(profile.reliability, "unknown"),
+        _DURABILITY.get(profile.durability, "unknown"),
+        _HISTORY.get(profile.history, "unknown"),
+        profile.depth,
+    )
+
+
+def live_qos(profiles: Iterable[QosProfile], depth: int) -> QoSProfile:
+    """Quality of service with which to publish what was recorded with these profiles."""
+    profiles = list(profiles)
+    best_effort = any(profile.reliability == "best_effort" for profile in profiles)
+    latched = bool(profiles) and all(profile.durability == "transient_local" for profile in profiles)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def matching_qos(publishers: Iterable[TopicEndpointInfo], depth: int) -> QoSProfile:
+    """The strictest subscription that matches every one of the publishers.
+
+    A reliable or latched subscription is not matched by a publisher that offers less: a driver that publishes
+    with best effort would be silently left out.
+    """
+    offered = [publisher.qos_profile for publisher in publishers]
+    reliable = all(qos.reliability != ReliabilityPolicy.BEST_EFFORT for qos in offered)
+    latched = all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def own_publishers_left_out(node: Node, topic: str) -> list[TopicEndpointInfo]:
+    """Publishers of a topic that belong to other nodes."""
+    return [
+        publisher
+        for publisher in node.get_publishers_info_by_topic(topic)
+        if (publisher.node_name, publisher.node_namespace) != (node.get_name(), node.get_namespace())
+    ]
