@@ -50,10 +50,10 @@ def _make_venv(work: Work, log: Path) -> None:
     else:
         command = [getattr(sys, "_base_executable", sys.executable), "-m", "venv"]
     lock = work.project.root / "requirements-uv.lock"
-    pip: list[str | Path] = [work.project.python, "-m", "pip", "install", "--disable-pip-version-check"]
+    pip: list[str | Path] = [work.project.python, "-m", "pip", "install", "--ignore-installed"]
     with Step("making the Python environment") as step:
         work.run(step, [*command, work.project.venv], log)
-        work.run(step, [*pip, "--require-hashes", "-r", lock], log)
+        work.run(step, [*pip, "--disable-pip-version-check", "--require-hashes", "-r", lock], log)
 
 
 def _install_packages(work: Work, log: Path) -> None:
