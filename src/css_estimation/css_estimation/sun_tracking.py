@@ -43,6 +43,8 @@ PARAMETERS: Table = (
     *eclipse_detector.PARAMETERS,
 )
 
+_LONGEST_STEP = 1e9  # [s]
+
 
 class TrackingParameters(NamedTuple):
     """Rates in rad/s."""
@@ -100,8 +102,8 @@ def initial_state() -> TrackingState:
 
 @kernel
 def elapsed(dt: float) -> float:
-    """The step [s], 0 for one that is negative or not finite: time that cannot be trusted has not passed."""
-    return dt if 0.0 < dt < math.inf else 0.0
+    """The step [s], 0 for one that is negative, absurd or no number: time that cannot be trusted has not passed."""
+    return dt if 0.0 < dt < _LONGEST_STEP else 0.0
 
 
 @kernel

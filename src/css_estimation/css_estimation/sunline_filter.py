@@ -58,7 +58,8 @@ def constrain(sun_b: Vec3, predicted_b: Vec3, covariance: Symmetric, largest_var
     sg = dot(sun_b, g)
     h = (g[0] - 0.5 * sg * sun_b[0], g[1] - 0.5 * sg * sun_b[1], g[2] - 0.5 * sg * sun_b[2])
     tangent = trace(covariance) - sg
-    along = 0.5 * tangent * tangent
+    # far from convergence e^2/2 means nothing, and no axis is more uncertain than the others
+    along = 0.5 * min(tangent * tangent, tangent)
     p = add_outer(subtract_pair(covariance, sun_b, h), along, sun_b)
     diagonal = max(p[0], max(p[3], p[5]))
     if diagonal > largest_variance:

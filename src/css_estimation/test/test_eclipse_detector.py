@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Hysteresis of the cells' verdict on eclipse, and how it is joined with an orbit model's."""
+
+import pytest
+
+from css_common.schema import default_values
+from css_estimation import eclipse_detector
+from css_estimation.eclipse_detector import detect_eclipse, initial_state
+from css_estimation.sun_heading import (
+    ECLIPSE_ECLIPSED,
+    ECLIPSE_SUNLIT,
+    PREDICTION_ECLIPSED,
+    PREDICTION_SUNLIT,
+    PREDICTION_UNKNOWN,
+)
+
+
+def parameters(**changes):
+    return eclipse_detector.parameters(default_values(eclipse_detector.PARAMETERS, **changes))
+
+
+def verdicts(p, outputs, predicted=PREDICTION_UNKNOWN, dt=0.5):
+    state, result = initial_state(), []
+    for largest in outputs:
+        state, eclipse = detect_eclipse(p, state, dt, largest, predicted)
+        result.append(eclipse)
+    return result
+
+
+def test_darkness_needs_ten_seconds_and_light_five():
+    p = parameters()
+    result = verdicts(p, [0.9] * 4 + [0.0] * 30 + [0.9] * 20)
+    assert result.index(ECLIPSE_ECLIPSED) == 4 + 20  # after more than 10 s at 0.5 s
+    light_again = result.index(ECLIPSE_SUNLIT, 30)
+    assert light_again == 34 + 10
+    assert result[:24] == [ECLIPSE_SUNLIT] * 24
+    assert result[light_again:] == [ECLIPSE_SUNLIT] * (54 - light_again)
+
+
+def test_a_flash_restarts_the_count():
+    p = parameters()
+    assert ECLIPSE_ECLIPSED not in verdicts(p, ([0.0] * 20 + [0.9]) * 5)
+    assert ECLIPSE_SUNLIT not in verdicts(p, [0.0] * 30 + ([0.9] * 10 + [0.0]) * 5)[24:]
+
+
+def test_between_the_levels_the_verdict_stands():
+    p = parameters()
+    assert ECLIPSE_ECLIPSED not in verdicts(p, [0.2] * 100)
+    assert ECLIPSE_SUNLIT not in verdicts(p, [0.0] * 30 + [0.2] * 100)[24:]
+
+
+@pytest.mark.parametrize("predicted", [PREDICTION_SUNLIT, PREDICTION_ECLIPSED])
+@pytest.mark.parametrize("largest", [0.0, 0.9])
+def test_model_alone_decides_at_once(predicted, largest):
+    p = parameters(eclipse__source="model")
+    expected = ECLIPSE_ECLIPSED if predicted == PREDICTION_ECLIPSED else ECLIPSE_SUNLIT
+    assert verdicts(p, [largest] * 50, predicted) == [expected] * 50
+
+
+def test_both_must_agree():
+    p = parameters(eclipse__source="both")
+    assert verdicts(p, [0.0] * 50, PREDICTION_SUNLIT)[-1] == ECLIPSE_SUNLIT
+    assert verdicts(p, [0.9] * 50, PREDICTION_ECLIPSED)[-1] == ECLIPSE_SUNLIT
+    assert verdicts(p, [0.0] * 50, PREDICTION_ECLIPSED)[-1] == ECLIPSE_ECLIPSED
+
+
+@pytest.mark.parametrize("source", ["model", "both"])
+def test_without_a_prediction_the_cells_decide(source):
+    p = parameters(eclipse__source=source)
+    outputs = [0.9] * 4 + [0.0] * 30 + [0.9] * 20
+    assert verdicts(p, outputs) == verdicts(parameters(), outputs)

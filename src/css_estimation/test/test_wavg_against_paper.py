@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Coverage and error map of the dual pyramid (O'Keefe & Schaub 2013, Figs. 1b and 2), and Eq. 2's properties.
+
+The paper prints its maps as figures and a few numbers of them; the figures here were computed independently from
+Eqs. 1, 2 and 16 on a grid of 720 x 1440 cell centres in polar angle and azimuth, weighted by area.
+"""
+
+import math
+
+import numpy as np
+import pytest
+
+from css_common.kernel import kernel
+from css_common.schema import default_values
+from css_common.sections import CELLS
+from css_common.vectors import angle_between
+from css_estimation import wavg
+from css_estimation.cell_layout import brightest, cell_layout, sees
+
+POLAR = (np.arange(720) + 0.5) * math.pi / 720
+AZIMUTH = (np.arange(1440) + 0.5) * 2.0 * math.pi / 1440
+WEIGHT = np.sin(POLAR) / np.sin(POLAR).sum()  # of a row of the map
+
+
+def wavg_parameters(**changes):
+    return wavg.parameters(default_values(CELLS + wavg.PARAMETERS, **changes))
+
+
+@kernel
+def map_of_sphere(layout, gate, polar, azimuth, warp, scale, voltages, error, seen):
+    """Error [rad] of the weighted average and number of cells that see the Sun, for each Sun direction."""
+    for a in range(polar.size):
+        for b in range(azimuth.size):
+            s = (
+                math.sin(polar[a]) * math.cos(azimuth[b]),
+                math.sin(polar[a]) * math.sin(azimuth[b]),
+                math.cos(polar[a]),
+            )
+            for i in range(voltages.size):
+                cell = layout.cells[i]
+                v = 0.0
+                if sees(layout, i, s):
+                    seen[a, b] += 1
+                    v = cell.nx * s[0] + cell.ny * s[1] + cell.nz * s[2]
+                    if warp:
+                        b2 = 1.0 - v * v
+                        v *= 1.0 + 0.5 * b2 - 0.65 * b2 * b2
+                voltages[i] = scale * v
+            s_hat, _, _ = wavg.weighted_average(layout, gate, voltages, brightest(voltages))
+            error[a, b] = angle_between(s_hat, s)
+
+
+def error_map(warp=False, scale=1.0, p=None):
+    p = p or wavg_parameters()
+    error = np.empty((POLAR.size, AZIMUTH.size))
+    seen = np.zeros((POLAR.size, AZIMUTH.size), dtype=np.int64)
+    map_of_sphere(p.layout, p.gate, POLAR, AZIMUTH, warp, scale, np.empty(p.layout.cells.size), error, seen)
+    return np.degrees(error), seen
+
+
+@pytest.fixture(scope="module")
+def ideal():
+    return error_map()
+
+
+@pytest.fixture(scope="module")
+def warped():
+    return error_map(warp=True)
+
+
+def percent_of_sphere(condition):
+    return 100.0 * (WEIGHT @ condition.mean(axis=1))
+
+
+def test_coverage_is_that_of_figure_1b(ideal):
+    _, seen = ideal
+    fractions = [round(percent_of_sphere(seen == n), 2) for n in range(5)]
+    assert fractions == [0.0, 35.08, 51.45, 9.38, 4.08]
+
+
+def test_coverage_without_the_body_plane():
+    p = wavg_parameters(cells__clip_normal=[0.0, 0.0, 0.0])
+    _, seen = error_map(p=p)
+    fractions = [round(percent_of_sphere(seen == n), 2) for n in range(5)]
+    assert fractions == [0.0, 17.53, 69.0, 9.38, 4.08]
+
+
+def test_clocking_of_the_cells_about_z_does_not_matter():
+    r = math.sqrt(0.5)
+    normals = [
+        v
+        for z in (r, -r)
+        for a in (45, 135, 225, 315)
+        for v in (r * math.cos(math.radians(a)), r * math.sin(math.radians(a)), z)
+    ]
+    error, seen = error_map(p=wavg_parameters(cells__normals=normals))
+    assert round(percent_of_sphere(seen == 1), 2) == 35.08
+    assert round(WEIGHT @ error.mean(axis=1), 2) == 23.84
+
+
+@pytest.mark.parametrize(
+    ("name", "mean", "largest", "beyond_30"), [("ideal", 23.84, 59.7, 35.9), ("warped", 23.87, 59.7, 35.75)]
+)
+def test_error_over_the_sphere(request, name, mean, largest, beyond_30):
+    error, _ = request.getfixturevalue(name)
+    digits = len(str(beyond_30).partition(".")[2])
+    assert round(WEIGHT @ error.mean(axis=1), 2) == mean
+    assert round(error.max(), 1) == largest
+    assert round(percent_of_sphere(error > 30.0), digits) == beyond_30
+
+
+@pytest.mark.parametrize(
+    ("name", "any_azimuth", "azimuth_mean", "all_azimuths"),
+    [
+        ("ideal", (65.4, 114.6), (69.1, 110.9), (75.1, 104.9)),
+        ("warped", (65.4, 114.6), (69.4, 110.6), (75.1, 104.9)),
+    ],
+)
+def test_band_about_the_equator_beyond_30_deg(request, name, any_azimuth, azimuth_mean, all_azimuths):
+    error, _ = request.getfixturevalue(name)
+    polar = np.degrees(POLAR)
+    for rows, band in (
+        (error.max(axis=1) > 30.0, any_azimuth),
+        (error.mean(axis=1) > 30.0, azimuth_mean),
+        (error.min(axis=1) > 30.0, all_azimuths),
+    ):
+        assert (round(polar[rows].min(), 1), round(polar[rows].max(), 1)) == band
+
+
+@pytest.mark.parametrize(
+    ("name", "limits"),
+    [
+        ("ideal", {10: "4.90", 15: "7.31", 19: "9.17", 20: "15.6", 30: "15.6", 45: "18.9", 60: "25.5", 75: "39.6"}),
+        ("warped", {10: "4.28", 15: "6.49", 19: "8.09", 20: "15.6", 30: "15.6", 45: "19.1", 60: "25.2", 75: "39.6"}),
+    ],
+)
+def test_largest_error_about_the_array_normal(request, name, limits):
+    error, _ = request.getfixturevalue(name)
+    polar = np.degrees(POLAR)
+    for within, printed in limits.items():
+        digits = len(printed.partition(".")[2])
+        assert f"{error[polar < within].max():.{digits}f}" == printed, within
+
+
+def test_error_stays_below_10_deg_within_19_deg_of_z(ideal):
+    """The paper's statement, and where it ends: two opposite cells lose the Sun at sin(theta) = 1/3."""
+    error, _ = ideal
+    first = np.degrees(POLAR[np.argmax(error.max(axis=1) > 10.0)])
+    assert round(first, 1) == 19.6
+    assert first - 0.25 <= math.degrees(math.asin(1.0 / 3.0)) + 0.25 <= first + 0.25
+
+
+@pytest.mark.parametrize(("theta", "error"), [(5.0, 2.495), (10.0, 4.962), (15.0, 7.369)])
+def test_bias_toward_the_pole_has_a_closed_form(theta, error):
+    """All four cells of one side lit: sum n n^T = diag(1, 1, 2), so tan(theta_hat) = tan(theta) / 2."""
+    p = wavg_parameters()
+    t = math.radians(theta)
+    s = np.array([math.sin(t), 0.0, math.cos(t)])
+    normals = np.stack([p.layout.cells[c] for c in ("nx", "ny", "nz")], axis=1)
+    voltages = np.where(normals[:, 2] > 0.0, np.maximum(normals @ s, 0.0), 0.0)
+    s_hat, mask, mode = wavg.weighted_average(p.layout, p.gate, voltages, brightest(voltages))
+    assert mask == 0b1111
+    assert mode == wavg.MODE_AVERAGE
+    assert math.degrees(math.atan2(s_hat[0], s_hat[2])) == pytest.approx(theta - error, abs=0.0005)
+    assert math.atan2(s_hat[0], s_hat[2]) == pytest.approx(math.atan(0.5 * math.tan(t)), abs=1e-14)
+
+
+@pytest.mark.parametrize("scale", [0.25, 0.74, 1.3])
+def test_a_common_scale_changes_nothing_with_the_relative_gate(ideal, scale):
+    error, _ = error_map(scale=scale)
+    np.testing.assert_allclose(error, ideal[0], rtol=0.0, atol=1e-6)
+
+
+def test_a_common_scale_matters_with_an_absolute_gate(ideal):
+    """Why the gate is relative: 0.74 is 0.8 of scale error, 5 % of degradation and the Sun of June together."""
+    p = wavg_parameters(gate_kind="absolute", gate=0.4)
+    error, _ = error_map(scale=0.74, p=p)
+    assert percent_of_sphere(np.abs(error - ideal[0]) > 1.0) > 5.0
+
+
+def test_albedo_light_below_the_gate_has_no_effect():
+    p = wavg_parameters()
+    direct = np.array([0.9, 0.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    lit_by_earth = direct.copy()
+    lit_by_earth[4:] = 0.4
+    clean = wavg.weighted_average(p.layout, p.gate, direct, 0)
+    assert wavg.weighted_average(p.layout, p.gate, lit_by_earth, 0) == clean
+
+
+def test_modes():
+    p = wavg_parameters()
+    dark = np.zeros(8)
+    assert wavg.weighted_average(p.layout, p.gate, dark, brightest(dark)) == ((0.0, 0.0, 0.0), 0, wavg.MODE_NO_SUN)
+    single = dark.copy()
+    single[3] = 0.6
+    s_hat, mask, mode = wavg.weighted_average(p.layout, p.gate, single, brightest(single))
+    assert (mask, mode) == (1 << 3, wavg.MODE_SINGLE_CELL)
+    cell = p.layout.cells[3]
+    np.testing.assert_allclose(s_hat, (cell["nx"], cell["ny"], cell["nz"]), rtol=1e-15)
+    absolute = wavg_parameters(gate_kind="absolute", gate=0.4)
+    dim = 0.5 * single
+    assert wavg.weighted_average(absolute.layout, absolute.gate, dim, 3)[1:] == (1 << 3, wavg.MODE_BELOW_GATE)
+    assert wavg.weighted_average(absolute.layout, absolute.gate, 0.15 * single, 3)[2] == wavg.MODE_NO_SUN
+
+
+def test_normals_that_cancel_leave_no_direction():
+    p = wavg_parameters(cells__normals=[1.0, 0.0, 0.0, -1.0, 0.0, 0.0], cells__clip_normal=[0.0, 0.0, 0.0])
+    voltages = np.array([0.7, 0.7])
+    assert wavg.weighted_average(p.layout, p.gate, voltages, 0) == ((0.0, 0.0, 0.0), 0, wavg.MODE_NO_SUN)
+
+
+def test_layout_of_the_default_mission_is_the_dual_pyramid():
+    layout = cell_layout(default_values(CELLS))
+    np.testing.assert_allclose(np.abs(layout.cells["nz"]), math.sqrt(0.5), rtol=1e-12)
+    assert layout.cos_half_view == pytest.approx(0.5)
