@@ -18,7 +18,8 @@ def install(work: Work) -> None:
     project = work.project
     host.check(project.root, work.ros, work.base)
     log = work.log("install.log")
-    say("sunpoint: setting up inside this folder, needed once")
+    why = "lock file, Python, ROS or folder have changed" if work.state.install else "needed once"
+    say(f"sunpoint: setting up inside this folder ({why})")
     for folder in (project.venv, project.build, project.install):
         # Scripts and CMake caches hold absolute paths and versions of what they were made with.
         if folder.exists():
