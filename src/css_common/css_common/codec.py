@@ -132,9 +132,12 @@ class Codec:
                     at += -at % field.size
                 values[field.name] = np.frombuffer(buffer, field.dtype, count, at + 8)
                 at += count * field.size
+        except DecodeError:
+            raise
         except (struct.error, ValueError) as error:
             raise DecodeError(f"{self.type_name}: {len(data)} bytes do not hold the message ({error})") from error
-        if not 0 <= len(data) - 4 - at < 4:  # some serialisers pad the end to four bytes
+        # Some serialisers pad the end to four bytes; that of rclpy aligns to doubles behind the count of an empty array.
+        if not 0 <= len(data) - 4 - at < 8:
             raise DecodeError(f"{self.type_name}: {len(data)} bytes given, the message takes {at + 4}")
         return sample
 
