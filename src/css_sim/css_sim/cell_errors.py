@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors that differ from cell to cell and last for a flight: scale, offset, misalignment.
+"""What differs from cell to cell and lasts for a flight: normals, and errors of scale, offset and alignment.
 
 The table of cells is one record array, because kernels pay for every array that a parameter holds.
 """
@@ -8,6 +8,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
@@ -24,11 +25,8 @@ PARAMETERS: Table = (
 )
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "bias")], align=True)
-"""One cell: true outward unit normal in b; `side`, the component of its nominal normal along the normal of the
-body plane that clips its view (0: not clipped); gain [-] and offset [-] of its output."""
-
-# A normal this close to the body plane lies in it: rounding must not hide half of such a cell's view.
-_IN_PLANE = 1e-9
+"""One cell: true outward unit normal in b; side of the screen that hides part of its sky, by the nominal normal, 0
+for none; gain [-] and offset [-] of its output."""
 
 
 class CellErrorModel(NamedTuple):
@@ -52,17 +50,16 @@ def error_model(values: Values) -> CellErrorModel:
     )
 
 
-def nominal_cells(normals_b: np.ndarray, clip_normal_b: np.ndarray) -> np.ndarray:
+def nominal_cells(normals_b: np.ndarray, side: ArrayLike = 0.0) -> np.ndarray:
     """Array (N,) of CELL without errors.
 
     Args:
         normals_b: (N, 3) outward unit normals.
-        clip_normal_b: (3,) normal of the body plane that hides the other half space from each cell; or zeros.
+        side: (N,) side of the screen on which each cell is; 0: nothing hides its view.
     """
     cells = np.zeros(len(normals_b), CELL)
     cells["nx"], cells["ny"], cells["nz"] = np.asarray(normals_b, dtype=np.float64).T
-    side = normals_b @ np.asarray(clip_normal_b, dtype=np.float64)
-    cells["side"] = np.where(np.abs(side) < _IN_PLANE, 0.0, side)
+    cells["side"] = side
     cells["gain"] = 1.0
     return cells
 

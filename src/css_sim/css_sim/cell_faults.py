@@ -87,7 +87,7 @@ def cell_faults(fault_texts: list[str], period_s: float) -> np.ndarray:
     return np.array(rows, dtype=FAULT)
 
 
-def fault_conflicts(fault_texts: list[str], cell_count: int) -> Iterator[str]:
+def conflicts(fault_texts: list[str], cell_count: int) -> Iterator[str]:
     """What is wrong with the faults of a mission with so many cells, one message each."""
     for text in fault_texts:
         try:

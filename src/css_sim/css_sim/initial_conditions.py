@@ -5,6 +5,7 @@ O'Keefe & Schaub 2013: attitude uniform over all attitudes, each rate uniform up
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -51,6 +52,16 @@ def parameters(values: Values) -> InitialConditions:
         omega_bn_b=(w1, w2, w3),
         max_rate=math.radians(values.initial.max_rate_deg_s),
     )
+
+
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values, one message each."""
+    given, wheels = len(values.initial.wheel_speed_rpm), len(values.wheels.axes)
+    if given not in (0, 1, wheels):
+        yield f"initial.wheel_speed_rpm: {given} values given, expected none, 1 or {wheels}"
+    fastest = np.max(np.abs(values.initial.wheel_speed_rpm), initial=0.0)
+    if fastest > values.wheels.max_speed_rpm:
+        yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"
 
 
 @kernel

@@ -3,7 +3,7 @@
 
 For each cell, in this order:
 
-    V  = f max(0, n.s)       if the Sun is in the cone of view and on the cell's side of the body plane
+    V  = f t max(0, n.s)     if the Sun is in the cone of view; t is what the screen (body plane, collar) lets pass
     V += albedo              light reflected by the Earth, computed elsewhere
     V  = 0                   if V is below the drop-out level
     V *= 1 + b^2/2 - 0.65 b^4     warp, with b = sin(arccos(V clipped to [0, 1]))
@@ -26,7 +26,9 @@ from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Table, Values, choice, flag, integer, real, texts
 from css_common.vectors import Vec3
+from css_environment.albedo import Screen, transmission
 from css_sim.cell_faults import FORM, apply_faults, cell_faults
+from css_sim.cell_screen import screen
 
 PARAMETERS: Table = (
     flag("warp", True, "flattened response of O'Keefe & Schaub 2013, Eq. 16"),
@@ -44,7 +46,7 @@ PARAMETERS: Table = (
 class SunCells(NamedTuple):
     """What all cells have in common; what differs from cell to cell is in `cell_errors.CELL`."""
 
-    clip_normal_b: Vec3  # [-] normal of the body plane that hides the other half space; zeros: none
+    screen: Screen  # what hides part of the sky
     cos_half_view: float
     warp: bool
     degradation: float
@@ -59,9 +61,8 @@ class SunCells(NamedTuple):
 
 def parameters(values: Values) -> SunCells:
     """Parameters of `sample` from checked values (`PARAMETERS`, the mission and its cells)."""
-    x, y, z = (float(c) for c in values.cells.clip_normal)
     return SunCells(
-        clip_normal_b=(x, y, z),
+        screen=screen(values),
         cos_half_view=math.cos(math.radians(0.5 * values.cells.field_of_view_deg)),
         warp=values.warp,
         degradation=values.degradation,
@@ -86,14 +87,12 @@ def warped(v: float) -> float:
 @kernel
 def _receive_light(p: SunCells, cells, sun_b, intensity, albedo, light_out) -> None:
     """Response to the Sun and the Earth before anything ages or differs from cell to cell."""
-    c = p.clip_normal_b
-    sun_side = c[0] * sun_b[0] + c[1] * sun_b[1] + c[2] * sun_b[2]
     for i in range(light_out.shape[0]):
         cell = cells[i]
         v = albedo[i]
         cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
-        if cosine >= p.cos_half_view and (cell.side * sun_side > 0.0 or cell.side == 0.0):
-            v += intensity * max(0.0, cosine)
+        if cosine >= p.cos_half_view:
+            v += intensity * max(0.0, cosine) * transmission(p.screen, cell.side, sun_b)
         if v < p.dropout:
             v = 0.0
         light_out[i] = warped(v) if p.warp else v

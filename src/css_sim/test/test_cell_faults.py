@@ -8,6 +8,7 @@ import pytest
 from scipy import stats
 
 from css_common.random_streams import random_key
+from css_sim import cell_faults as cell_faults_module
 from css_sim.cell_faults import (
     DEAD,
     NOISY,
@@ -15,7 +16,6 @@ from css_sim.cell_faults import (
     Fault,
     apply_faults,
     cell_faults,
-    fault_conflicts,
     parse_fault,
 )
 
@@ -46,8 +46,8 @@ def test_wrong_text_is_refused(text):
 
 
 def test_conflicts_name_the_fault():
-    assert list(fault_conflicts(["0 dead", "7 stuck 1.0"], 8)) == []
-    wrong = list(fault_conflicts(["8 dead", "oops"], 8))
+    assert list(cell_faults_module.conflicts(["0 dead", "7 stuck 1.0"], 8)) == []
+    wrong = list(cell_faults_module.conflicts(["8 dead", "oops"], 8))
     assert "'8 dead' given, expected a cell from 0 to 7" in wrong[0]
     assert "'oops'" in wrong[1]
 

@@ -17,7 +17,7 @@ from css_common.random_streams import random_key
 from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_common.vectors import multiply
-from css_sim import cell_errors, sun_cells
+from css_sim import cell_errors, cell_screen, sun_cells
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "coarse_sun_sensor.json").read_text())
 CASES = [case for case in REFERENCE["cases"] if case["kellyFactor"] == 0.0]
@@ -26,7 +26,7 @@ CASES = [case for case in REFERENCE["cases"] if case["kellyFactor"] == 0.0]
 def outputs(case, faults=()):
     """Our output for a Basilisk case."""
     values = default_values(
-        MISSION + CELLS + sun_cells.PARAMETERS,
+        MISSION + CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS,
         cells__normals=case["nHat_B"],
         cells__field_of_view_deg=min(180.0, math.degrees(2.0 * case["fov"])),
         cells__clip_normal=[0.0, 0.0, 0.0],
@@ -36,7 +36,7 @@ def outputs(case, faults=()):
         output_high=min(10.0, case["maxOutput"]),
         faults=list(faults),
     )
-    cells = cell_errors.nominal_cells(values.cells.normals, values.cells.clip_normal)
+    cells = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
     cells["gain"] = case["scaleFactor"]
     cells["bias"] = case["senBias"] * case["scaleFactor"]
     sun_line = np.array(case["r_SN_N"]) - case["r_BN_N"]

@@ -10,7 +10,7 @@ import pytest
 from css_common.random_streams import random_key
 from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
-from css_sim import cell_errors, sun_cells
+from css_sim import cell_errors, cell_screen, sun_cells
 
 KEY = random_key(1, 0)
 PLAIN = {"warp": False, "degradation": 0.0}
@@ -18,8 +18,8 @@ PLAIN = {"warp": False, "degradation": 0.0}
 
 def build(**changes):
     """Parameters and nominal cells of the paper's spacecraft."""
-    values = default_values(MISSION + CELLS + sun_cells.PARAMETERS, **changes)
-    return sun_cells.parameters(values), cell_errors.nominal_cells(values.cells.normals, values.cells.clip_normal)
+    values = default_values(MISSION + CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS, **changes)
+    return sun_cells.parameters(values), cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
 
 
 def read(p, cells, sun_b, intensity=1.0, albedo=None, step=0):
@@ -98,6 +98,34 @@ def test_a_cell_in_the_body_plane_is_not_clipped():
     for z in (0.5, -0.5):
         voltages, _ = read(p, cells, (math.sqrt(0.75), 0, z))
         assert voltages[0] == pytest.approx(math.sqrt(0.75))
+
+
+def test_collar_dims_its_cells_alone():
+    # Benton: all light within 28 deg of the collar's axis, none beyond 44.9 deg
+    p, cells = build(
+        **PLAIN,
+        cells__normals=[0.0, 0.0, 1.0, 0.0, 0.0, 1.0],
+        cells__field_of_view_deg=166.0,
+        cells__clip_normal=[0.0, 0.0, 0.0],
+        collar__axis=[0.0, 0.0, 1.0],
+        collar__cells=[1],
+    )
+    full, dark = math.cos(math.radians(28.0)), math.cos(math.radians(44.9))
+    for angle in (0.0, 27.9, 30.0, 40.0, 44.8, 45.0, 80.0):
+        c = math.cos(math.radians(angle))
+        voltages, _ = read(p, cells, (math.sqrt(1 - c * c), 0, c))
+        part = min(max((c - dark) / (full - dark), 0.0), 1.0)
+        np.testing.assert_allclose(voltages, [c, c * part], rtol=1e-12)
+
+
+def test_conflicts_of_a_collar_are_named():
+    table = MISSION + CELLS + cell_screen.PARAMETERS
+    values = default_values(table, collar__axis=[0.0, 0.0, 2.0], collar__cells=[3, 8], collar__full_deg=50.0)
+    found = "\n".join(cell_screen.conflicts(values))
+    for part in ("length 2", "cells.clip_normal", "8 given, expected numbers from 0 to 7", "50 given"):
+        assert part in found
+    assert "without" in next(cell_screen.conflicts(default_values(table, collar__cells=[1])))
+    assert list(cell_screen.conflicts(default_values(table))) == []
 
 
 def test_eclipse_leaves_nothing_and_distance_scales():

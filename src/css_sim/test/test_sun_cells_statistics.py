@@ -10,7 +10,7 @@ from scipy import stats
 from css_common.random_streams import random_key
 from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
-from css_sim import cell_errors, sun_cells
+from css_sim import cell_errors, cell_screen, sun_cells
 
 SIGNIFICANCE = 1e-4
 STEPS = 20_000
@@ -21,8 +21,10 @@ LIGHT = np.full(8, 0.6)
 def build(**changes):
     """Parameters, error statistics and nominal cells."""
     changes = {"warp": False, "degradation": 0.0, "output_low": -10.0, "output_high": 10.0} | changes
-    values = default_values(MISSION + CELLS + sun_cells.PARAMETERS + cell_errors.PARAMETERS, **changes)
-    nominal = cell_errors.nominal_cells(values.cells.normals, values.cells.clip_normal)
+    values = default_values(
+        MISSION + CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS, **changes
+    )
+    nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
     return sun_cells.parameters(values), cell_errors.error_model(values), nominal
 
 

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reflectivity of the Earth that a mission asks for: which model or file, and whether a case draws its own."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from css_common.random_streams import RandomKey
+from css_common.schema import Table, Values, choice, flag, real, text
+from css_environment.reflectivity import (
+    Reflectivity,
+    constant_reflectivity,
+    draw_reflectivity,
+    knocke_reflectivity,
+    read_reflectivity,
+    zonal_reflectivity,
+)
+
+PARAMETERS: Table = (
+    flag("albedo.enabled", True, "light that the Earth reflects onto the cells (O'Keefe & Schaub 2013, Eq. 17)"),
+    choice(
+        "albedo.reflectivity",
+        "zonal",
+        ("zonal", "knocke", "constant", "file"),
+        "annual means by latitude, seasonal model by latitude, one value, or a grid from files",
+    ),
+    real("albedo.constant", 0.3, "-", "the one value", low=0.0, high=1.0),
+    text("albedo.mean_file", "", "comma-separated fractions, rows from south to north, columns from 180 deg west"),
+    text("albedo.std_file", "", "standard deviations on the same grid; empty: none"),
+    choice(
+        "albedo.draw",
+        "mean",
+        ("mean", "common", "per_cell"),
+        "means as they are, or drawn once per case: one draw for the whole Earth, or one for each cell of the grid",
+    ),
+    real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0),
+    real("albedo.limit", 1.0, "-", "reflectivities are cut to this", low=0.0, high=1.0),
+)
+
+
+def source(values: Values, epoch_ns: int) -> Reflectivity:
+    """Means and standard deviations before any draw.
+
+    Raises:
+        ValueError: a file is missing or wrong.
+    """
+    albedo = values.albedo
+    if albedo.reflectivity == "zonal":
+        # columns matter only to independent draws
+        return zonal_reflectivity() if albedo.draw == "per_cell" else zonal_reflectivity(1)
+    if albedo.reflectivity == "knocke":
+        return knocke_reflectivity(epoch_ns)
+    if albedo.reflectivity == "constant":
+        return constant_reflectivity(albedo.constant)
+    return read_reflectivity(albedo.mean_file, albedo.std_file or None)
+
+
+def case_reflectivity(values: Values, grid: Reflectivity, key: RandomKey) -> np.ndarray:
+    """Reflectivities (rows, columns) of one case [-]."""
+    albedo = values.albedo
+    drawn = np.array(grid.mean)
+    if albedo.draw != "mean":
+        draw_reflectivity(grid, key, albedo.draw == "common", drawn)
+    return np.minimum(albedo.factor * drawn, albedo.limit)
+
+
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values, one message each."""
+    albedo = values.albedo
+    if albedo.reflectivity == "file":
+        if not albedo.mean_file:
+            yield "albedo.mean_file: missing, expected a file because albedo.reflectivity is file"
+            return
+        try:
+            source(values, 0)
+        except (OSError, ValueError) as error:
+            yield f"albedo.mean_file: {error}"
+    elif albedo.draw != "mean" and albedo.reflectivity in ("knocke", "constant"):
+        yield f"albedo.draw: {albedo.draw} given, but {albedo.reflectivity} has no standard deviations; expected mean"

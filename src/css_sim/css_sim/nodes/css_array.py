@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated coarse sun sensors."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from css_common.attitude import mrp_to_dcm
+from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.random_streams import random_key
+from css_common.run import node_main
+from css_common.schema import Values
+from css_common.vectors import multiply
+from css_environment.albedo import albedo_output, new_workspace
+from css_environment.earth_light import albedo_sources, new_earth_view, new_light
+from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
+from css_environment.ephemeris import segment_start
+from css_msgs.msg import CssVoltages, SpacecraftState
+from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, sun_cells
+
+
+class CssArray(Component):
+    """Outputs of the coarse sun sensor cells in the light of the Sun and of the Earth (O'Keefe & Schaub 2013)."""
+
+    shared = ("cells",)
+    parameters = (
+        *sun_cells.PARAMETERS,
+        *cell_errors.PARAMETERS,
+        *cell_screen.PARAMETERS,
+        *earth_reflectivity.PARAMETERS,
+    )
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        used = ("r_n", "sigma_bn", "sun_n", "solar_flux", "illumination")
+        return (Input("truth", "truth", SpacecraftState, frame=INERTIAL, used=used),)
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("voltages", "css/voltages", CssVoltages),)
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        yield from cell_faults.conflicts(values.faults, len(values.cells.normals))
+        yield from cell_screen.conflicts(values)
+        yield from earth_reflectivity.conflicts(values)
+        if values.output_low >= values.output_high:
+            yield f"output_low: {values.output_low:g} given, expected less than output_high"
+
+    def configure(self) -> None:
+        values = self.values
+        self._key = random_key(values.mission.seed, values.mission.case)
+        self._p = sun_cells.parameters(values)
+        nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
+        self._cells = nominal.copy()
+        cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, self._cells)
+        grid = earth_reflectivity.source(values, self.epoch_ns)
+        self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
+        self._view, self._light, self._work = new_earth_view(), new_light(), new_workspace()
+        self._albedo = np.zeros(len(nominal))
+        self._segment_s = -1.0
+        self._dcm_en = None
+
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._p = sun_cells.parameters(values)
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        truth = received["truth"]
+        dcm_bn = mrp_to_dcm(_vector(truth.sigma_bn))
+        sun_n = _vector(truth.sun_n)
+        if self.values.albedo.enabled:
+            dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
+            albedo_sources(
+                self._view, _vector(truth.r_n), sun_n, truth.solar_flux, dcm_en, self._reflectivity, self._light
+            )
+            albedo_output(
+                self._light, self._cells, self._p.screen, self._p.cos_half_view, dcm_bn, self._work, self._albedo
+            )
+        voltages = np.zeros(len(self._cells))
+        saturated = sun_cells.sample(
+            self._p,
+            self._cells,
+            self._key,
+            self.step_of(stamp_ns),
+            multiply(dcm_bn, sun_n),
+            truth.solar_flux * truth.illumination,
+            self._albedo,
+            voltages,
+        )
+        return {"voltages": self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)}
+
+    def _earth_attitude(self, elapsed_s: float):
+        """Rotation from n to the Earth-fixed frame, in the same segments and so the same digits as the ephemeris."""
+        start_s = segment_start(elapsed_s)
+        if start_s != self._segment_s:
+            self._segment_s = start_s
+            self._dcm_en = dcm_en_at(self.epoch_ns, start_s)
+        return advance_dcm_en(self._dcm_en, elapsed_s - start_s)
+
+
+def _vector(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = values.tolist()
+    return (x, y, z)
+
+
+main = node_main(CssArray)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated spacecraft, the owner of simulated time."""
+
+from collections.abc import Iterable
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+
+from css_common.attitude import mrp_to_quaternion
+from css_common.component import INERTIAL, Input, Outgoing, Output, Plant, Received
+from css_common.random_streams import random_key
+from css_common.run import node_main
+from css_common.schema import Values, flag, integer
+from css_environment.ephemeris import EnvironmentState
+from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
+from css_sim import disturbances, flight_environment, initial_conditions
+from css_sim.rigid_body import wheel_speeds
+from css_sim.spacecraft import advance, spacecraft
+
+
+class Dynamics(Plant):
+    """Turns the spacecraft under wheels, rods and disturbances along its orbit, and publishes the truth."""
+
+    shared = ("orbit", "spacecraft", "wheels", "rods", "lockstep")
+    parameters = (
+        *initial_conditions.PARAMETERS,
+        *flight_environment.PARAMETERS,
+        *disturbances.PARAMETERS,
+        integer("substeps", 1, "-", "integration steps per control cycle", low=1, high=1000),
+        flag("publish_pose", False, "also publish the body's pose, for displays"),
+    )
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        wheels = Input(
+            "wheels",
+            "wheels/torque_command",
+            WheelTorqueCommand,
+            required=False,  # a mission may fly without control
+            lengths={"torque": len(values.wheels.axes)},
+            used=("torque",),
+        )
+        if not values.rods.fitted:
+            return (wheels,)
+        rods = Input(
+            "rods",
+            "rods/dipole_command",
+            RodDipoleCommand,
+            required=False,
+            lengths={"dipole": len(values.rods.axes)},
+            used=("dipole",),
+        )
+        return wheels, rods
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        outputs = [
+            Output("truth", "truth", SpacecraftState, frame=INERTIAL),
+            Output("wheels", "wheels/state", WheelState),
+        ]
+        if values.publish_pose:
+            outputs.append(Output("pose", "truth/pose", PoseStamped, frame=INERTIAL))
+        return tuple(outputs)
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        yield from disturbances.conflicts(values)
+        yield from initial_conditions.conflicts(values)
+
+    def configure(self) -> None:
+        values = self.values
+        key = random_key(values.mission.seed, values.mission.case)
+        self._craft = spacecraft(values, key, values.substeps)
+        self._environment = flight_environment.FlightEnvironment(values)
+        self._state = initial_conditions.initial_state(initial_conditions.parameters(values), key)
+        self._momentum = initial_conditions.initial_wheel_momentum(
+            self._craft.body, self._state.omega_bn_b, values.initial.wheel_speed_rpm
+        )
+        self._wheels_at_rest = np.zeros(len(self._momentum))
+        self._rods_at_rest = np.zeros(len(self._craft.rod_axes_b))
+        self._torque = np.zeros(len(self._momentum))
+        self._steps = round(values.mission.duration / values.mission.period)
+        self.finished = False
+
+    def begin(self) -> Outgoing:
+        return self._messages(self.epoch_ns, 0, 0)
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        wheels, rods = received["wheels"], received.get("rods")
+        self._state, torque_limited, speed_limited = advance(
+            self._craft,
+            self._state,
+            self._momentum,
+            self._wheels_at_rest if wheels is None else wheels.torque,
+            self._rods_at_rest if rods is None else rods.dipole,
+            self._surroundings(stamp_ns),
+            0.0,
+            self.period_ns * 1e-9,
+            self._torque,
+        )
+        stamp_ns += self.period_ns
+        self.finished = self.step_of(stamp_ns) >= self._steps
+        return self._messages(stamp_ns, torque_limited, speed_limited)
+
+    def _surroundings(self, stamp_ns: int) -> EnvironmentState:
+        return self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
+
+    def _messages(self, stamp_ns: int, torque_limited: int, speed_limited: int) -> Outgoing:
+        state, surroundings = self._state, self._surroundings(stamp_ns)
+        speed = np.zeros(len(self._momentum))
+        wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
+        messages = {
+            "truth": self.message(
+                "truth",
+                stamp_ns,
+                r_n=surroundings.r_n,
+                v_n=surroundings.v_n,
+                sigma_bn=state.sigma_bn,
+                omega_bn_b=state.omega_bn_b,
+                sun_n=surroundings.sun_n,
+                field_n=surroundings.field_n,
+                solar_flux=surroundings.solar_flux,
+                illumination=surroundings.illumination,
+            ),
+            "wheels": self.message(
+                "wheels",
+                stamp_ns,
+                speed_limited=speed_limited,
+                speed=speed,
+                torque_limited=torque_limited,
+                torque=self._torque.copy(),
+            ),
+        }
+        if self.values.publish_pose:
+            # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
+            # dcm_bn in the convention of css_common.attitude
+            pose = (*surroundings.r_n, *mrp_to_quaternion(state.sigma_bn))
+            messages["pose"] = self.message("pose", stamp_ns, pose=pose)
+        return messages
+
+
+main = node_main(Dynamics)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

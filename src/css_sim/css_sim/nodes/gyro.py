@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated rate gyro."""
+
+import numpy as np
+from sensor_msgs.msg import Imu
+
+from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.random_streams import random_key
+from css_common.run import node_main
+from css_common.schema import Values
+from css_msgs.msg import SpacecraftState
+from css_sim import gyro
+
+_NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+_ZERO = (0.0, 0.0, 0.0)
+_NO_TURN = (0.0, 0.0, 0.0, 1.0)
+
+
+class Gyro(Component):
+    """Body rates with bias and noise. Deactivated, it says for every stamp that it has no estimate (covariance -1)."""
+
+    shared = ()
+    parameters = gyro.PARAMETERS
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        return (Input("truth", "truth", SpacecraftState, frame=INERTIAL, used=("omega_bn_b",)),)
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("imu", "gyro/imu", Imu),)
+
+    def configure(self) -> None:
+        self._key = random_key(self.values.mission.seed, self.values.mission.case)
+        self._p = gyro.parameters(self.values)
+        self._errors = gyro.draw_errors(self._p, self._key)
+        self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        x, y, z = received["truth"].omega_bn_b.tolist()
+        rate = gyro.measure(self._p, self._errors, self._key, self.step_of(stamp_ns), (x, y, z))
+        return self._imu(stamp_ns, rate, self._covariance)
+
+    def idle(self, stamp_ns: int, received: Received) -> Outgoing:
+        return self._imu(stamp_ns, _ZERO, _NOTHING)
+
+    def _imu(self, stamp_ns: int, rate: tuple[float, float, float], covariance: np.ndarray) -> Outgoing:
+        imu = self.message(
+            "imu",
+            stamp_ns,
+            orientation=_NO_TURN,
+            orientation_covariance=_NOTHING,
+            angular_velocity=rate,
+            angular_velocity_covariance=covariance,
+            linear_acceleration=_ZERO,
+            linear_acceleration_covariance=_NOTHING,
+        )
+        return {"imu": imu}
+
+
+main = node_main(Gyro)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Simulated magnetometer."""
+
+import numpy as np
+from sensor_msgs.msg import MagneticField
+
+from css_common.attitude import mrp_to_dcm
+from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.random_streams import random_key
+from css_common.run import node_main
+from css_common.schema import Values
+from css_common.vectors import multiply
+from css_msgs.msg import SpacecraftState
+from css_sim import magnetometer
+
+
+class Magnetometer(Component):
+    """Geomagnetic field in the body frame with bias and noise, every `magnetometer.divider` cycles."""
+
+    shared = ("magnetometer",)
+    parameters = magnetometer.PARAMETERS
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        return (Input("truth", "truth", SpacecraftState, frame=INERTIAL, used=("sigma_bn", "field_n")),)
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("field", "mag/field", MagneticField, divider=values.magnetometer.divider),)
+
+    def configure(self) -> None:
+        self._key = random_key(self.values.mission.seed, self.values.mission.case)
+        self._p = magnetometer.parameters(self.values)
+        self._bias_b = magnetometer.draw_bias(self._p, self._key)
+        self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        step = self.step_of(stamp_ns)
+        if step % self.values.magnetometer.divider:
+            return {}
+        truth = received["truth"]
+        s1, s2, s3 = truth.sigma_bn.tolist()
+        x, y, z = truth.field_n.tolist()
+        field_b = multiply(mrp_to_dcm((s1, s2, s3)), (x, y, z))
+        measured = magnetometer.measure(self._p, self._bias_b, self._key, step, field_b)
+        return {
+            "field": self.message(
+                "field", stamp_ns, magnetic_field=measured, magnetic_field_covariance=self._covariance
+            )
+        }
+
+
+main = node_main(Magnetometer)
+
+if __name__ == "__main__":
+    raise SystemExit(main())
