@@ -77,7 +77,7 @@ def matching_qos(publishers: Iterable[TopicEndpointInfo], depth: int) -> QoSProf
     )
 
 
-def own_publishers_left_out(node: Node, topic: str) -> list[TopicEndpointInfo]:
+def publishers_of_others(node: Node, topic: str) -> list[TopicEndpointInfo]:
     """Publishers of a topic that belong to other nodes."""
     return [
         publisher

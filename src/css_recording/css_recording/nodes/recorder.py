@@ -3,7 +3,6 @@
 
 import argparse
 import json
-import signal
 import sys
 import time
 from collections.abc import Sequence
@@ -21,6 +20,7 @@ from css_common.mission_file import MissionError
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
 from css_recording.recorder import RecorderNode
+from css_recording.stop_signal import StopSignal
 
 _DESCRIPTION = """\
 Record topics into an MCAP recording in rosbag2 layout, until SIGINT or SIGTERM. Log times are the stamps of the
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = _parser().parse_args(remove_ros_args(["recorder", *given])[1:])
-    stop = _StopSignal()
+    stop = StopSignal()
     try:
         mission = load_mission(options.mission, options.set) if options.mission else None
     except MissionError as error:
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         rclpy.try_shutdown()
 
 
-def _record(options: argparse.Namespace, mission: Mission | None, folder: Path, stop: "_StopSignal") -> int:
+def _record(options: argparse.Namespace, mission: Mission | None, folder: Path, stop: StopSignal) -> int:
     everything = options.all or not (options.mission or options.topic)
     node = RecorderNode(mission, folder, options.topic, everything=everything, overwrite=options.overwrite)
     executor = create_executor()
@@ -112,18 +112,6 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--overwrite", action="store_true", help="replace a recording that is there")
     parser.add_argument("--summary", metavar="FILE", help="leave the figures of the recording in a JSON file")
     return parser
-
-
-class _StopSignal:
-    """Remembers that the process was asked to end."""
-
-    def __init__(self) -> None:
-        self.came = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._note)
-
-    def _note(self, number: int, frame: object) -> None:
-        self.came = True
 
 
 if __name__ == "__main__":

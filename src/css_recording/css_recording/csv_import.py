@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Turns a table of foreign telemetry into a recording that replays like one of Sunpoint's own.
+
+Topics: `css/voltages`, `gyro/imu` where the table has rates, and `truth` where it has the Sun vector. The mission
+inside carries the cell layout, the epoch and the period, so that estimators find what they need.
+"""
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+from sensor_msgs.msg import Imu
+
+from css_common.codec import codec_of
+from css_common.epochs import format_utc
+from css_common.mission_file import dump_sections
+from css_msgs.msg import CssVoltages, SpacecraftState
+from css_recording.bag_metadata import Topic
+from css_recording.bag_writer import BagWriter
+from css_recording.cell_layout import CellLayout
+from css_recording.errors import BagError
+from css_recording.provenance import software_versions
+from css_recording.telemetry_table import Telemetry, TelemetryRow
+
+BODY_FRAME = "bus"
+INERTIAL_FRAME = "eci"
+VOLTAGES = Topic("/css/voltages", "css_msgs/msg/CssVoltages")
+IMU = Topic("/gyro/imu", "sensor_msgs/msg/Imu")
+TRUTH = Topic("/truth", "css_msgs/msg/SpacecraftState")
+_SHORTEST_PERIOD_S, _LONGEST_PERIOD_S = 0.001, 60.0
+_LARGEST_GAP_S = 60.0
+_NO_ESTIMATE = -1.0  # first element of a covariance: the quantity is not measured
+
+
+@dataclass
+class ImportReport:
+    """What an import made.
+
+    Attributes:
+        recording: the new recording.
+        messages: messages of each topic.
+        missing_cells: single cell outputs that were missing; they are NaN in the recording.
+        missing_lines: lines without any cell output, which give no message.
+        missing_rates: lines without a rate, recorded as a gyro that does not measure.
+        skipped: broken lines left out, by what is wrong with them.
+        ignored_columns: columns that are nothing known.
+        gaps: steps of time longer than one and a half periods.
+        period_s: usual step of time.
+        largest_output: of any cell.
+    """
+
+    recording: Path
+    messages: dict[str, int] = field(default_factory=dict)
+    missing_cells: int = 0
+    missing_lines: int = 0
+    missing_rates: int = 0
+    skipped: Mapping[str, int] = field(default_factory=dict)
+    ignored_columns: tuple[str, ...] = ()
+    gaps: int = 0
+    period_s: float = 0.0
+    largest_output: float = 0.0
+
+
+def import_telemetry(
+    telemetry: Telemetry, layout: CellLayout, source: Path, folder: Path, *, overwrite: bool = False
+) -> ImportReport:
+    """Writes telemetry into a new recording.
+
+    Args:
+        telemetry: what `read_telemetry` gave for `source`.
+        layout: cells of the spacecraft.
+        source: file it came from, kept by name and hash.
+        folder: the recording.
+        overwrite: replace a recording that is there.
+
+    Raises:
+        BagError: the table is no time series of cell outputs, or the recording cannot be written.
+    """
+    report = ImportReport(folder, skipped=telemetry.skipped, ignored_columns=telemetry.ignored_columns)
+    steps = _examine(telemetry.rows, source, report)
+    topics = [TRUTH] * telemetry.has_sun + [VOLTAGES] + [IMU] * telemetry.has_rate
+    metadata = {
+        "mission": mission_text(telemetry, layout, source.stem, report.period_s, max(steps, default=0.0)),
+        "imported_from": json.dumps({"file": source.name, "sha256": hashlib.sha256(source.read_bytes()).hexdigest()}),
+        **software_versions(),
+    }
+    with BagWriter(folder, topics, metadata, overwrite=overwrite) as writer:
+        for row in telemetry.rows:
+            for topic, data in _messages(row, telemetry.has_rate):
+                writer.write(topic.name, row.stamp_ns, data)
+        report.messages = writer.counts
+    return report
+
+
+def mission_text(telemetry: Telemetry, layout: CellLayout, name: str, period_s: float, largest_step_s: float) -> str:
+    """Mission file for replaying the telemetry; everything that it does not know keeps its default."""
+    rows = telemetry.rows
+    return dump_sections(
+        {
+            "/**": {
+                "mission.name": name,
+                "mission.description": "imported telemetry",
+                "mission.epoch": format_utc(rows[0].stamp_ns),
+                "mission.duration": max((rows[-1].stamp_ns - rows[0].stamp_ns) * 1e-9, period_s),
+                "mission.period": min(max(period_s, _SHORTEST_PERIOD_S), _LONGEST_PERIOD_S),
+                "cells.normals": [component for normal in layout.normals_b for component in normal],
+                "cells.field_of_view_deg": layout.field_of_view_deg,
+                "cells.clip_normal": list(layout.clip_normal_b),
+                "io.body_frame": BODY_FRAME,
+                "io.inertial_frame": INERTIAL_FRAME,
+                "io.largest_gap": max(_LARGEST_GAP_S, 2.0 * largest_step_s),
+            }
+        }
+    )
+
+
+def _examine(rows: list[TelemetryRow], source: Path, report: ImportReport) -> list[float]:
+    """Fills in what the table tells about itself; gives the steps of time [s]."""
+    steps = [(b.stamp_ns - a.stamp_ns) * 1e-9 for a, b in zip(rows, rows[1:], strict=False)]
+    report.period_s = round(median(steps), 6) if steps else _LONGEST_PERIOD_S
+    report.gaps = sum(step > 1.5 * report.period_s for step in steps)
+    outputs = [value for row in rows for value in row.cells if not math.isnan(value)]
+    if not outputs:
+        raise BagError(f"{source}: every cell output is missing")
+    report.largest_output = max(outputs)
+    report.missing_lines = sum(_is_blind(row) for row in rows)
+    report.missing_cells = sum(math.isnan(value) for row in rows if not _is_blind(row) for value in row.cells)
+    report.missing_rates = sum(row.omega_bn_b is None for row in rows)
+    return steps
+
+
+def _is_blind(row: TelemetryRow) -> bool:
+    return all(math.isnan(value) for value in row.cells)
+
+
+def _messages(row: TelemetryRow, has_rate: bool) -> Iterator[tuple[Topic, bytes]]:
+    rate = np.zeros(3) if row.omega_bn_b is None else np.array(row.omega_bn_b)
+    if row.sun_b is not None:
+        # The attitude is not known: body and inertial frame are taken for one, so that the Sun direction in the
+        # body is the one of the table. Position and field are not known either and stay zero.
+        codec = codec_of(SpacecraftState)
+        truth = codec.sample(row.stamp_ns, INERTIAL_FRAME, sun_n=np.array(row.sun_b), omega_bn_b=rate)
+        truth.solar_flux = truth.illumination = 1.0
+        yield TRUTH, codec.encode(truth)
+    if not _is_blind(row):
+        codec = codec_of(CssVoltages)
+        yield VOLTAGES, codec.encode(codec.sample(row.stamp_ns, BODY_FRAME, voltages=np.array(row.cells)))
+    if has_rate:
+        codec = codec_of(Imu)
+        unknown = np.zeros(9)
+        unknown[0] = _NO_ESTIMATE
+        sample = codec.sample(
+            row.stamp_ns,
+            BODY_FRAME,
+            orientation=np.array([0.0, 0.0, 0.0, 1.0]),
+            orientation_covariance=unknown,
+            angular_velocity=rate,
+            angular_velocity_covariance=unknown if row.omega_bn_b is None else np.zeros(9),
+            linear_acceleration_covariance=unknown,
+        )
+        yield IMU, codec.encode(sample)

@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Publishes a recording to live nodes: at a rate, or in lockstep with the nodes that answer it.
+
+What a live node publishes is left to it. Messages go out as the bytes that were recorded, with the stamps that
+they have. Lockstep is the reproducible way: all messages of one stamp are published, and the next follow when every
+awaited topic has answered that stamp.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import groupby
+from operator import attrgetter
+
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import Executor
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rosgraph_msgs.msg import Clock
+
+from css_common.codec import stamp_of
+from css_recording.bag_reader import BagMessage, BagReader
+from css_recording.errors import BagError
+from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
+from css_recording.ros_topics import live_qos, matching_qos, message_class_of, publishers_of_others
+
+_DEPTH = 100
+_SETTLED_AFTER = 1.0
+_SETTLE_LIMIT = 10.0
+_LOOK_EVERY = 1.0
+_SPIN = 0.05
+
+
+class PlayerNode(Node):
+    """Plays one recording."""
+
+    def __init__(
+        self,
+        reader: BagReader,
+        options: PlaybackOptions,
+        *,
+        context: Context | None = None,
+        use_global_arguments: bool = True,
+    ) -> None:
+        """Prepares playback; `play` does it.
+
+        Raises:
+            BagError: the recording lacks a topic that the options name.
+        """
+        super().__init__("player", context=context, use_global_arguments=use_global_arguments)
+        self.report = PlaybackReport()
+        self._reader = reader
+        self._options = options
+        counts = {entry.topic.name: entry.count for entry in reader.topics}
+        chosen = counts if options.topics is None else [self.resolve_topic_name(name) for name in options.topics]
+        unknown = [name for name in chosen if name not in counts]
+        if unknown:
+            raise BagError(f"{reader.path}: no topic {unknown[0]}")
+        self._topics = [entry.topic for entry in reader.topics if entry.topic.name in chosen]
+        self._publishers_by_topic: dict[str, Publisher] = {}
+        self._answered: dict[str, int] = {}
+        self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if options.clock else None
+        pace = self.resolve_topic_name(options.pace) if options.pace else None
+        self._pace = pace or max(chosen, key=lambda name: counts[name], default="")
+        if self._pace not in chosen:
+            raise BagError(f"{reader.path}: no topic {self._pace} to pace the playback")
+        self._executor: Executor | None = None
+        self._stopped: Callable[[], bool] = lambda: False
+
+    def play(self, executor: Executor, stopped: Callable[[], bool] = lambda: False) -> PlaybackReport:
+        """Plays the recording once; returns early when `stopped`.
+
+        Args:
+            executor: runs this node, and any others of the process.
+            stopped: asked again and again.
+
+        Raises:
+            PlaybackError: a node that should answer is absent or silent.
+            BagError: the recording cannot be read.
+        """
+        self._executor, self._stopped = executor, stopped
+        if not self._publishers_by_topic:
+            self._settle()
+            self._create_publishers()
+            self._meet_partners()
+        self._publish_all()
+        for publisher in self._publishers_by_topic.values():
+            publisher.wait_for_all_acked(Duration(seconds=2))
+        return self.report
+
+    # Before the first message
+
+    def _settle(self) -> None:
+        """Waits until no more topics or publishers appear."""
+        before: object = None
+        quiet_since = began = time.monotonic()
+        while not self._stopped() and time.monotonic() - began < _SETTLE_LIMIT:
+            now = [(topic.name, len(publishers_of_others(self, topic.name))) for topic in self._topics]
+            graph = (now, sorted(self.get_node_names()))
+            if graph != before:
+                before, quiet_since = graph, time.monotonic()
+            if time.monotonic() - quiet_since >= _SETTLED_AFTER:
+                return
+            self._spin(_SPIN)
+
+    def _create_publishers(self) -> None:
+        for topic in self._topics:
+            if publishers_of_others(self, topic.name):
+                self.report.left_to_live_nodes.append(topic.name)
+                self.get_logger().info(f"{topic.name} is left to the node that publishes it")
+                continue
+            try:
+                message_class = message_class_of(topic.type)
+            except BagError as error:
+                self.report.not_installed.append(topic.name)
+                self.get_logger().warning(f"{topic.name} is not played: {error}")
+                continue
+            self._publishers_by_topic[topic.name] = self.create_publisher(
+                message_class, topic.name, live_qos(topic.qos, _DEPTH)
+            )
+            self.report.published[topic.name] = 0
+
+    def _meet_partners(self) -> None:
+        for name in self._options.wait_for:
+            topic = self.resolve_topic_name(name)
+            if topic in self._publishers_by_topic:
+                raise PlaybackError(f"no live node publishes {topic}, which the playback is to wait for")
+            self._listen_to(topic)
+        if self._options.wait_for:
+            self._wait(self._all_listeners_matched, "no live node listens to the recording")
+        elif not self._all_listeners_matched():
+            self.get_logger().info("no live node listens yet")
+
+    def _listen_to(self, topic: str) -> None:
+        """Subscribes to a topic that answers."""
+        self._wait(lambda: bool(publishers_of_others(self, topic)), f"no live node publishes {topic}")
+        publishers = publishers_of_others(self, topic)
+        if not publishers:
+            return  # stopped
+        self._answered[topic] = -1
+        subscription = self.create_subscription(
+            message_class_of(publishers[0].topic_type),
+            topic,
+            partial(self._note_answer, topic),
+            matching_qos(publishers, _DEPTH),
+            raw=True,
+        )
+        self._wait(lambda: subscription.get_publisher_count() > 0, f"{topic} cannot be heard")
+
+    def _all_listeners_matched(self) -> bool:
+        """At least one topic has listeners, and whoever is known to listen is connected."""
+        listeners = 0
+        for topic, publisher in self._publishers_by_topic.items():
+            connected = publisher.get_subscription_count()
+            if connected < self.count_subscribers(topic):
+                return False
+            listeners += connected
+        return listeners > 0
+
+    # Playing
+
+    def _publish_all(self) -> None:
+        self._answered = dict.fromkeys(self._answered, -1)
+        start_ns = self._reader.start_ns + round(self._options.start * 1e9)
+        began = time.monotonic()
+        looked = began
+        for stamp_ns, messages in self._by_stamp(start_ns):
+            due = began + (stamp_ns - start_ns) * 1e-9 / self._options.rate
+            while not self._stopped() and time.monotonic() < due:
+                self._spin(min(_SPIN, max(0.0, due - time.monotonic())))
+            if self._stopped():
+                return
+            if time.monotonic() - looked > _LOOK_EVERY:
+                looked = time.monotonic()
+                self._give_way()
+            paced = self._publish_group(stamp_ns, messages)
+            if paced and self._answered:
+                self._await_answers(stamp_ns)
+
+    def _by_stamp(self, start_ns: int) -> Iterator[tuple[int, Iterable[BagMessage]]]:
+        end_ns = None if self._options.end is None else self._reader.start_ns + round(self._options.end * 1e9)
+        played = [*self._publishers_by_topic, *([self._pace] if self._answered else [])]
+        return groupby(self._reader.messages(set(played), start_ns, end_ns), key=attrgetter("stamp_ns"))
+
+    def _publish_group(self, stamp_ns: int, messages: Iterable[BagMessage]) -> bool:
+        """Publishes the messages of one stamp; whether the pacing topic was among them."""
+        paced = False
+        for message in messages:
+            publisher = self._publishers_by_topic.get(message.topic)
+            if publisher is not None:
+                publisher.publish(message.data)
+                self.report.published[message.topic] += 1
+            paced = paced or message.topic == self._pace
+        if self._clock_publisher is not None:
+            now = Clock()
+            now.clock.sec, now.clock.nanosec = divmod(stamp_ns, 1_000_000_000)
+            self._clock_publisher.publish(now)
+        self.report.stamps += 1
+        return paced
+
+    def _give_way(self) -> None:
+        """Stops publishing what a live node has begun to publish."""
+        for topic in list(self._publishers_by_topic):
+            if publishers_of_others(self, topic):
+                self.get_logger().warning(f"{topic} is left to the node that publishes it now")
+                self.destroy_publisher(self._publishers_by_topic.pop(topic))
+                self.report.left_to_live_nodes.append(topic)
+
+    def _note_answer(self, topic: str, data: bytes) -> None:
+        self._answered[topic] = stamp_of(data)
+
+    def _await_answers(self, stamp_ns: int) -> None:
+        def complete() -> bool:
+            return all(answered >= stamp_ns for answered in self._answered.values())
+
+        if not complete():
+            self._wait(complete, f"no answer to stamp {stamp_ns} ns", lambda: self._silent(stamp_ns))
+
+    def _silent(self, stamp_ns: int) -> str:
+        silent = [topic for topic, answered in self._answered.items() if answered < stamp_ns]
+        return f" on {', '.join(silent)}"
+
+    def _wait(self, condition: Callable[[], bool], failure: str, detail: Callable[[], str] = str) -> None:
+        limit = time.monotonic() + self._options.patience
+        while not condition() and not self._stopped():
+            if time.monotonic() > limit:
+                raise PlaybackError(f"{failure}{detail()} after {self._options.patience:g} s")
+            self._spin(_SPIN)
+
+    def _spin(self, seconds: float) -> None:
+        assert self._executor is not None
+        self._executor.spin_once(timeout_sec=seconds)
