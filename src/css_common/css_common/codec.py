@@ -136,7 +136,7 @@ class Codec:
             raise
         except (struct.error, ValueError) as error:
             raise DecodeError(f"{self.type_name}: {len(data)} bytes do not hold the message ({error})") from error
-        # Some serialisers pad the end to four bytes; that of rclpy aligns to doubles behind the count of an empty array.
+        # Some serialisers pad the end to four bytes; rclpy's aligns to doubles behind the count of an empty array.
         if not 0 <= len(data) - 4 - at < 8:
             raise DecodeError(f"{self.type_name}: {len(data)} bytes given, the message takes {at + 4}")
         return sample

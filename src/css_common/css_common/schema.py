@@ -106,6 +106,8 @@ class Parameter:
             if not isinstance(value, (int, np.integer)):
                 raise TypeError
             number: Any = int(value)
+            if not -(2**63) <= number < 2**63:  # what a ROS parameter holds
+                raise ValueError
         else:
             # ROS refuses `1` where a double is declared; so do we, so that a file means the same to every reader
             if not isinstance(value, (float, np.floating)):
@@ -130,6 +132,8 @@ class Parameter:
             items = [item.strip() for item in inner.split(",")] if inner else []
         else:
             items = [text.strip()]
+        if self.kind == "texts":
+            items = [item.strip("'\"") for item in items]  # as in a file
         base = {"reals": "real", "integers": "integer", "texts": "text"}.get(self.kind, self.kind)
         values: list[Any] = []
         for item in items:
@@ -287,7 +291,7 @@ def checked_values(table: Iterable[Parameter], given: Mapping[str, Any]) -> dict
     for name in given:
         if name not in specifications:
             raise ParameterError(unknown_name(name, specifications))
-    return {name: p.check(given[name]) if name in given else p.default for name, p in specifications.items()}
+    return {name: p.check(given.get(name, p.default)) for name, p in specifications.items()}
 
 
 def shaped_values(table: Iterable[Parameter], canonical: Mapping[str, Any]) -> Values:
@@ -305,4 +309,4 @@ def default_values(table: Iterable[Parameter], **changes: Any) -> Values:
 def unknown_name(name: str, known: Iterable[str]) -> str:
     """Message for an unknown name, with the nearest known one."""
     near = get_close_matches(name, list(known), n=1)
-    return f"{name}: unknown" + (f"; did you mean {near[0]}?" if near else "")
+    return f"{name if name.isprintable() else repr(name)}: unknown" + (f"; did you mean {near[0]}?" if near else "")

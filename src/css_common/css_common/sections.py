@@ -8,10 +8,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from css_common.codec import MAX_FRAME
 from css_common.epochs import parse_utc
 from css_common.schema import Table, Values, choice, flag, integer, real, reals, text, texts
 
 _R = 0.7071067811865476
+_LAST_STAMP_NS = 2**31 * 1_000_000_000
 
 MISSION: Table = (
     text("mission.name", "okeefe_2013", "name of the mission, as in the file name"),
@@ -151,10 +153,7 @@ SECTIONS: dict[str, Table] = {
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values of the shared sections, one message each: key, value, what was expected."""
     if hasattr(values, "mission"):
-        try:
-            parse_utc(values.mission.epoch)
-        except ValueError as error:
-            yield f"mission.epoch: {error}"
+        yield from _mission_conflicts(values.mission)
     if hasattr(values, "orbit") and values.orbit.source == "tle":
         for key in ("tle_line1", "tle_line2"):
             if len(getattr(values.orbit, key)) != 69:
@@ -173,6 +172,23 @@ def conflicts(values: Values) -> Iterator[str]:
             yield f"wheels.axes: they span {rank} of 3 directions, expected axes that span all"
     if hasattr(values, "rods"):
         yield from _unit_rows("rods.axes", values.rods.axes, 1, 32)
+    if hasattr(values, "io"):
+        for key in ("body_frame", "inertial_frame"):
+            if len(getattr(values.io, key).encode()) >= MAX_FRAME:
+                yield f"io.{key}: expected a name shorter than {MAX_FRAME} bytes"
+
+
+def _mission_conflicts(mission: Values) -> Iterator[str]:
+    try:
+        begin = parse_utc(mission.epoch)
+    except ValueError as error:
+        yield f"mission.epoch: {error}"
+        return
+    if begin < 0 or begin + mission.duration * 1e9 >= _LAST_STAMP_NS:
+        yield (
+            f"mission.epoch: {mission.epoch} given, expected a flight of {mission.duration:g} s between "
+            "1970-01-01 and 2038-01-19: the seconds of a ROS stamp have 32 bits"
+        )
 
 
 def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:

@@ -2,6 +2,7 @@
 """The codec against rclpy's serialiser and, as that leaves padding uninitialised, against the one of `rosbags`."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -178,7 +179,7 @@ def test_own_messages_have_no_padding_before_their_last_double_with_the_default_
         message = message_type()
         message.header.frame_id = frame
         spans = list(value_bytes(message))
-        gaps = [(a, b) for (_, a), (b, _) in zip(spans, spans[1:], strict=False) if a != b]
+        gaps = [(a, b) for (_, a), (b, _) in pairwise(spans) if a != b]
         assert not gaps
 
 
