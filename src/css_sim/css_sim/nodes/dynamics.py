@@ -11,7 +11,6 @@ from css_common.component import INERTIAL, Input, Outgoing, Output, Plant, Recei
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
-from css_environment.ephemeris import EnvironmentState
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
 from css_sim import disturbances, flight_environment, initial_conditions
 from css_sim.rigid_body import wheel_speeds
@@ -93,7 +92,7 @@ class Dynamics(Plant):
             self._momentum,
             self._wheels_at_rest if wheels is None else wheels.torque,
             self._rods_at_rest if rods is None else rods.dipole,
-            self._surroundings(stamp_ns),
+            self._surroundings,
             0.0,
             self.period_ns * 1e-9,
             self._torque,
@@ -102,23 +101,22 @@ class Dynamics(Plant):
         self.finished = self.step_of(stamp_ns) >= self._steps
         return self._messages(stamp_ns, torque_limited, speed_limited)
 
-    def _surroundings(self, stamp_ns: int) -> EnvironmentState:
-        return self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
-
     def _messages(self, stamp_ns: int, torque_limited: int, speed_limited: int) -> Outgoing:
-        state, surroundings = self._state, self._surroundings(stamp_ns)
+        # kept, because the cycle that begins at this stamp needs it too
+        self._surroundings = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
+        state, surroundings = self._state, self._surroundings
         speed = np.zeros(len(self._momentum))
         wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
         messages = {
             "truth": self.message(
                 "truth",
                 stamp_ns,
-                r_n=surroundings.r_n,
-                v_n=surroundings.v_n,
-                sigma_bn=state.sigma_bn,
-                omega_bn_b=state.omega_bn_b,
-                sun_n=surroundings.sun_n,
-                field_n=surroundings.field_n,
+                r_n=np.array(surroundings.r_n),
+                v_n=np.array(surroundings.v_n),
+                sigma_bn=np.array(state.sigma_bn),
+                omega_bn_b=np.array(state.omega_bn_b),
+                sun_n=np.array(surroundings.sun_n),
+                field_n=np.array(surroundings.field_n),
                 solar_flux=surroundings.solar_flux,
                 illumination=surroundings.illumination,
             ),
@@ -134,7 +132,7 @@ class Dynamics(Plant):
         if self.values.publish_pose:
             # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
             # dcm_bn in the convention of css_common.attitude
-            pose = (*surroundings.r_n, *mrp_to_quaternion(state.sigma_bn))
+            pose = np.array((*surroundings.r_n, *mrp_to_quaternion(state.sigma_bn)))
             messages["pose"] = self.message("pose", stamp_ns, pose=pose)
         return messages
 

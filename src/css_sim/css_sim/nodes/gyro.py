@@ -12,8 +12,8 @@ from css_msgs.msg import SpacecraftState
 from css_sim import gyro
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-_ZERO = (0.0, 0.0, 0.0)
-_NO_TURN = (0.0, 0.0, 0.0, 1.0)
+_ZERO = np.zeros(3)
+_NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 class Gyro(Component):
@@ -39,12 +39,12 @@ class Gyro(Component):
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         x, y, z = received["truth"].omega_bn_b.tolist()
         rate = gyro.measure(self._p, self._errors, self._key, self.step_of(stamp_ns), (x, y, z))
-        return self._imu(stamp_ns, rate, self._covariance)
+        return self._imu(stamp_ns, np.array(rate), self._covariance)
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
         return self._imu(stamp_ns, _ZERO, _NOTHING)
 
-    def _imu(self, stamp_ns: int, rate: tuple[float, float, float], covariance: np.ndarray) -> Outgoing:
+    def _imu(self, stamp_ns: int, rate: np.ndarray, covariance: np.ndarray) -> Outgoing:
         imu = self.message(
             "imu",
             stamp_ns,

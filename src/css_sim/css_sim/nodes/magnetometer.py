@@ -45,7 +45,7 @@ class Magnetometer(Component):
         measured = magnetometer.measure(self._p, self._bias_b, self._key, step, field_b)
         return {
             "field": self.message(
-                "field", stamp_ns, magnetic_field=measured, magnetic_field_covariance=self._covariance
+                "field", stamp_ns, magnetic_field=np.array(measured), magnetic_field_covariance=self._covariance
             )
         }
 
