@@ -85,32 +85,21 @@ def warped(v: float) -> float:
 
 
 @kernel
-def _receive_light(p: SunCells, cells, sun_b, intensity, albedo, light_out) -> None:
-    """Response to the Sun and the Earth before anything ages or differs from cell to cell."""
-    for i in range(light_out.shape[0]):
-        cell = cells[i]
-        v = albedo[i]
-        cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
-        if cosine >= p.cos_half_view:
-            v += intensity * max(0.0, cosine) * transmission(p.screen, cell.side, sun_b)
-        if v < p.dropout:
-            v = 0.0
-        light_out[i] = warped(v) if p.warp else v
-
-
-@kernel
-def _degrade(p: SunCells, key, step, voltages) -> None:
-    n = voltages.shape[0]
-    if not p.degradation_per_cell:
-        factor = 1.0 - p.degradation * uniform4(key, Stream.CELL_DEGRADATION, step, 0)[0]
+def _draw_degradation(p: SunCells, key, step, factors_out) -> None:
+    """Factors of this cycle that the cells' outputs are multiplied by."""
+    n = factors_out.shape[0]
+    if p.degradation <= 0.0 or not p.degradation_per_cell:
+        factor = 1.0
+        if p.degradation > 0.0:
+            factor -= p.degradation * uniform4(key, Stream.CELL_DEGRADATION, step, 0)[0]
         for i in range(n):
-            voltages[i] *= factor
+            factors_out[i] = factor
         return
     for block in range((n + 3) // 4):
         draws = uniform4(key, Stream.CELL_DEGRADATION, step, 1 + block)
         first = 4 * block
         for j in range(min(4, n - first)):
-            voltages[first + j] *= 1.0 - p.degradation * draws[j]
+            factors_out[first + j] = 1.0 - p.degradation * draws[j]
 
 
 @kernel
@@ -163,11 +152,19 @@ def sample(
         albedo: (N,) light reflected by the Earth that each cell receives [-].
         voltages_out: (N,) outputs [-], written.
     """
-    _receive_light(p, cells, sun_b, intensity, albedo, voltages_out)
-    if p.degradation > 0.0:
-        _degrade(p, key, step, voltages_out)
+    # the outputs hold the factors until each is used
+    _draw_degradation(p, key, step, voltages_out)
     for i in range(voltages_out.shape[0]):
-        voltages_out[i] = cells[i].gain * voltages_out[i] + cells[i].bias
+        cell = cells[i]
+        v = albedo[i]
+        cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
+        if cosine >= p.cos_half_view:
+            v += intensity * max(0.0, cosine) * transmission(p.screen, cell.side, sun_b)
+        if v < p.dropout:
+            v = 0.0
+        if p.warp:
+            v = warped(v)
+        voltages_out[i] = cell.gain * v * voltages_out[i] + cell.bias
     if p.noise > 0.0:
         _add_noise(p.noise, key, step, voltages_out)
     if p.faults.shape[0] > 0:
