@@ -43,7 +43,9 @@ def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
     """Map (n, 3) from a torque in b to wheel torques of least norm, for (n, 3) axes, by SVD."""
     axes = np.array(axes_b, dtype=np.float64)
     axes[list(out_of_service)] = 0.0
-    return np.linalg.pinv(axes.T)
+    inverse = np.linalg.pinv(axes.T)
+    inverse[list(out_of_service)] = 0.0  # free of rounding
+    return inverse
 
 
 def parameters(values: Values) -> AllocationParameters:
