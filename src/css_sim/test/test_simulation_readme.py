@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The README's parameter and topic tables say what the nodes declare."""
+
+from pathlib import Path
+
+import pytest
+
+from css_common.schema import default_values
+from css_sim.nodes.css_array import CssArray
+from css_sim.nodes.dynamics import Dynamics
+from css_sim.nodes.gyro import Gyro
+from css_sim.nodes.magnetometer import Magnetometer
+
+README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+
+
+def rows(text):
+    """Cells of the table rows of a text by what the first cell names."""
+    lines = [line.replace("\\|", "/") for line in text.splitlines() if line.startswith("| `")]
+    cells = [[c.strip() for c in line.split("|")[1:-1]] for line in lines]
+    return {row[0].strip("`* "): row for row in cells}
+
+
+SECTIONS = {part.split("\n", 1)[0].strip(): rows(part) for part in README.split("### ")[1:]}
+COMPONENTS = (Dynamics, CssArray, Gyro, Magnetometer)
+
+
+@pytest.mark.parametrize("kind", COMPONENTS)
+def test_parameters(kind):
+    table = SECTIONS[kind.__module__.rpartition(".")[2]]
+    for parameter in kind.parameters:
+        name, default, unit, _, meaning = table[parameter.name]
+        assert name.endswith("*") == parameter.tunable, parameter.name
+        assert unit == parameter.unit, parameter.name
+        assert meaning == parameter.description.replace("|", "/"), parameter.name
+        if parameter.kind == "real":
+            assert float(default) == parameter.default, parameter.name
+
+
+@pytest.mark.parametrize("kind", COMPONENTS)
+def test_topics(kind):
+    values = default_values(kind.table())
+    for output in kind.outputs("x", values):
+        package = output.message_type.__module__.split(".")[0]
+        assert rows(README)[output.topic][1] == f"`{package}/{output.message_type.__name__}`"
