@@ -70,13 +70,17 @@ class _Field:
         self.zero = False if code == "?" else 0.0 if code in "df" else 0
 
 
+def type_name(message_type: type) -> str:
+    """Name of a message class as ROS tools print it: `css_msgs/msg/CssVoltages`."""
+    return f"{message_type.__module__.split('.')[0]}/msg/{message_type.__name__}"
+
+
 class Codec:
     """Converter of one message type; get it with `codec_of`."""
 
     def __init__(self, message_type: type) -> None:
         self.message_type = message_type
-        package, kind, name = message_type.__module__.split(".")[0], "msg", message_type.__name__
-        self.type_name = f"{package}/{kind}/{name}"
+        self.type_name = type_name(message_type)
         names = list(message_type.get_fields_and_field_types())
         if not names or message_type.get_fields_and_field_types()[names[0]] != "std_msgs/Header":
             raise TypeError(f"{self.type_name} does not begin with a std_msgs/Header")

@@ -7,7 +7,9 @@ nobody declares, so each reader checks the whole file here first and a typo dies
 """
 
 import importlib
+import math
 import os
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,9 +17,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from css_common import sections
+from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant
 from css_common.epochs import parse_utc
 from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
@@ -251,7 +252,10 @@ class Mission:
                 raise MissionError(f"{where}.time: {time!r} given, expected seconds from the epoch, such as 600.0")
             if action not in _ACTIONS:
                 raise MissionError(f"{where}.action: {action!r} given, expected one of {', '.join(_ACTIONS)}")
-            target = self.node(str(node))
+            names = [n.name for n in self.nodes]
+            if node not in names:
+                raise MissionError(f"{where}.node: {unknown_name(str(node), names)}")
+            target = self.node(node)
             event = Event(name, time, target.name, action, str(fields.get("parameter", "")), fields.get("value"))
             if action == "set":
                 self._check_set_event(where, target, event)
@@ -276,22 +280,36 @@ class Mission:
                 where = f"{self.origin}: {SHARED}: criteria.{quantity}.{key}"
                 if key not in ("min", "max"):
                     raise MissionError(f"{where}: unknown, expected min or max")
-                if not isinstance(value, float):
+                if not isinstance(value, float) or not math.isfinite(value):
                     raise MissionError(f"{where}: {value!r} given, expected a number written with a point")
         return criteria
 
+    def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
+        if entry.message_type is not output.message_type:
+            raise MissionError(
+                f"{self.origin}: {node.name} takes {entry.topic} as {type_name(entry.message_type)}, "
+                f"{publisher} publishes {type_name(output.message_type)}"
+            )
+        if node.values.io.input_matching == "exact" and entry.divider % output.divider:
+            raise MissionError(
+                f"{self.origin}: {node.name} expects {entry.topic} every {entry.divider} steps, "
+                f"{publisher} publishes it every {output.divider}"
+            )
+
     def _check_wiring(self) -> None:
-        publishers: dict[str, str] = {}
+        publishers: dict[str, tuple[str, Output]] = {}
         for node in self.nodes:
             for output in node.outputs:
                 if output.topic in publishers:
                     raise MissionError(
-                        f"{self.origin}: {node.name} and {publishers[output.topic]} both publish {output.topic}"
+                        f"{self.origin}: {node.name} and {publishers[output.topic][0]} both publish {output.topic}"
                     )
-                publishers[output.topic] = node.name
+                publishers[output.topic] = node.name, output
         for node in self.nodes:
             for entry in node.inputs:
-                if entry.required and entry.topic not in publishers:
+                if entry.topic in publishers:
+                    self._check_connection(node, entry, *publishers[entry.topic])
+                elif entry.required:
                     raise MissionError(
                         f"{self.origin}: {node.name} needs the topic {unknown_name(entry.topic, publishers)}; "
                         "no node of graph.nodes publishes it"
@@ -336,10 +354,10 @@ def parse_node_entry(entry: str, origin: str) -> tuple[str, str, str]:
     Raises:
         MissionError: the entry has another form.
     """
-    where, _, name = entry.partition(":")
-    package, separator, executable = where.partition("/")
-    if not (separator and package.isidentifier() and executable.isidentifier()):
+    form = re.fullmatch(r"([A-Za-z]\w*)/([A-Za-z]\w*)(?::([A-Za-z]\w*))?", entry, re.ASCII)
+    if form is None:
         raise MissionError(f"{origin}: {SHARED}: graph.nodes: {entry!r} given, expected PACKAGE/EXECUTABLE[:NAME]")
+    package, executable, name = form.groups()
     return package, executable, name or executable
 
 
@@ -409,10 +427,7 @@ def load_mission(name: str | Path, overrides: Iterable[str] = ()) -> Mission:
 
 def mission_from_text(text: str, origin: str, overrides: Iterable[str] = ()) -> Mission:
     """The mission of a parameter file's text (for instance the one embedded in a recording)."""
-    try:
-        parameters = {name: flattened(section) for name, section in read_sections(text, origin).items()}
-    except yaml.YAMLError as error:
-        raise MissionError(f"{origin}: not valid YAML: {error}") from error
+    parameters = {name: flattened(section) for name, section in read_sections(text, origin).items()}
     mission = Mission(origin, parameters)
     overrides = list(overrides)
     return mission.with_overrides(overrides) if overrides else mission

@@ -2,8 +2,8 @@
 """Reading and writing of ROS 2 parameter files, strict where YAML and ROS are silent."""
 
 import re
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 import yaml
 
@@ -13,22 +13,49 @@ class MissionError(Exception):
 
 
 class _Loader(yaml.SafeLoader):
-    """Refuses keys that stand twice, and reads 1e-4 as a number, as ROS does (YAML 1.1 makes it a text)."""
+    """Reads plain words as ROS does, and refuses what ROS refuses or would take without a word.
+
+    YAML 1.1 makes an instant of 2013-06-01, 90 of 1:30, a text of 1e-4 and a truth value of the key `off`; the parser
+    of ROS does not. Keys that stand twice are an error.
+    """
+
+    yaml_implicit_resolvers: ClassVar[dict] = {}
+    bool_values: ClassVar[dict] = yaml.SafeLoader.bool_values | {"y": True, "n": False}
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            line = self.peek_event().start_mark.line + 1
+            raise MissionError(f"line {line}: aliases are not read by ROS, expected the values themselves")
+        return super().compose_node(parent, index)
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         keys = set()
         for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if key in keys:
-                raise MissionError(f"line {key_node.start_mark.line + 1}: {key} stands twice")
-            keys.add(key)
+            line = key_node.start_mark.line + 1
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise MissionError(f"line {line}: expected a word as key")
+            key_node.tag = "tag:yaml.org,2002:str"
+            if key_node.value in keys:
+                raise MissionError(f"line {line}: {key_node.value} stands twice")
+            keys.add(key_node.value)
         return super().construct_mapping(node, deep)
 
 
-_Loader.add_implicit_resolver(
-    "tag:yaml.org,2002:float",
-    re.compile(r"^[-+]?(\d+\.?\d*([eE][-+]?\d+)|\d+\.\d*|\.\d+([eE][-+]?\d+)?|\.(inf|nan))$", re.IGNORECASE),
-    list("-+0123456789."),
+class _Dumper(yaml.SafeDumper):
+    """Quotes every text that the loader would read as something else."""
+
+
+def _plain(tag: str, pattern: str, first: Sequence[str]) -> None:
+    expression = re.compile(f"^(?:{pattern})$", re.IGNORECASE)
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{tag}", expression, list(first))
+    _Dumper.add_implicit_resolver(f"tag:yaml.org,2002:{tag}", expression, list(first))
+
+
+_plain("bool", "y|yes|n|no|true|false|on|off", "yYnNtTfFoO")
+_plain("null", "~|null|", ["~", "n", "N", ""])
+_plain("int", r"[-+]?(0x[0-9a-f]+|0[0-7]*|[1-9]\d*)", "-+0123456789")
+_plain(
+    "float", r"[-+]?(\d+\.?\d*e[-+]?\d+|\d+\.\d*|\.\d+(e[-+]?\d+)?|\.inf)|\.nan", "-+0123456789."
 )
 
 
@@ -43,7 +70,7 @@ def read_sections(text: str, origin: str) -> dict[str, dict[str, Any]]:
         document = yaml.load(text, _Loader)
     except MissionError as error:
         raise MissionError(f"{origin}: {error}") from error
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         raise MissionError(f"{origin}: not valid YAML: {' '.join(str(error).split())}") from error
     if document is None:
         return {}
@@ -56,19 +83,32 @@ def read_sections(text: str, origin: str) -> dict[str, dict[str, Any]]:
         parameters = body["ros__parameters"]
         if not isinstance(parameters, Mapping):
             raise MissionError(f"{origin}: {name}: ros__parameters must hold keys and values")
-        result[str(name).lstrip("/") if name != "/**" else "/**"] = dict(parameters)
+        section = name.lstrip("/") if name != "/**" else name
+        if section in result:
+            raise MissionError(f"{origin}: {section} stands twice")
+        _refuse_twice(parameters, f"{origin}: {section}")
+        result[section] = dict(parameters)
     return result
 
 
-def flattened(nested: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _refuse_twice(parameters: Mapping[str, Any], place: str) -> None:
+    names = [name for name, _ in _leaves(parameters)]
+    for name in names:
+        if names.count(name) > 1:
+            raise MissionError(f"{place}: {name} stands twice, once as a dotted name")
+
+
+def flattened(nested: Mapping[str, Any]) -> dict[str, Any]:
     """Dotted names and values of nested parameters."""
-    flat: dict[str, Any] = {}
+    return dict(_leaves(nested))
+
+
+def _leaves(nested: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in nested.items():
         if isinstance(value, Mapping):
-            flat |= flattened(value, f"{prefix}{key}.")
+            yield from _leaves(value, f"{prefix}{key}.")
         else:
-            flat[f"{prefix}{key}"] = value
-    return flat
+            yield f"{prefix}{key}", value
 
 
 def dump_sections(parameters: Mapping[str, Mapping[str, Any]]) -> str:
@@ -76,7 +116,7 @@ def dump_sections(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     document = {
         section: {"ros__parameters": _nested(flat)} for section, flat in parameters.items() if flat
     }
-    return yaml.safe_dump(document, sort_keys=False, default_flow_style=None, width=110)
+    return yaml.dump(document, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=110)
 
 
 def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:

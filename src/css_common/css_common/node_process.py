@@ -10,6 +10,7 @@ from pathlib import Path
 import rclpy
 from rclpy.executors import ExternalShutdownException
 
+from css_common.codec import type_name
 from css_common.component import Component, Plant
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
@@ -112,14 +113,12 @@ def describe(component_type: type[Component]) -> str:
     lines = [f"ros2 run {package} {name} [--ros-args --params-file MISSION.yaml ...]", ""]
     lines += [(component_type.__doc__ or "").strip(), "", "Subscribes:"]
     lines += [
-        f"  {i.topic}  {i.message_type.__module__.split('.')[0]}/msg/{i.message_type.__name__}"
-        + ("" if i.required else "  (optional)")
+        f"  {i.topic}  {type_name(i.message_type)}" + ("" if i.required else "  (optional)")
         for i in component_type.inputs(name, values)
     ] or ["  nothing"]
     lines += ["", "Publishes:"]
     lines += [
-        f"  {o.topic}  {o.message_type.__module__.split('.')[0]}/msg/{o.message_type.__name__}"
-        for o in component_type.outputs(name, values)
+        f"  {o.topic}  {type_name(o.message_type)}" for o in component_type.outputs(name, values)
     ]
     lines += ["  /diagnostics  diagnostic_msgs/msg/DiagnosticArray", "", "Parameters (* may change in flight):"]
     for p in component_type.table():

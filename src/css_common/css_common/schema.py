@@ -309,4 +309,5 @@ def default_values(table: Iterable[Parameter], **changes: Any) -> Values:
 def unknown_name(name: str, known: Iterable[str]) -> str:
     """Message for an unknown name, with the nearest known one."""
     near = get_close_matches(name, list(known), n=1)
-    return f"{name if name.isprintable() else repr(name)}: unknown" + (f"; did you mean {near[0]}?" if near else "")
+    shown = name if name and name.isprintable() else repr(name)
+    return f"{shown}: unknown" + (f"; did you mean {near[0]}?" if near else "")
