@@ -79,6 +79,7 @@ class Component:
 
     shared: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[Table] = ()
+    _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
 
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
@@ -94,7 +95,7 @@ class Component:
     @classmethod
     def table(cls) -> Table:
         """All parameters of the node: shared sections first, then its own."""
-        sections = dict.fromkeys(("mission", "io", *cls.shared))
+        sections = dict.fromkeys((*cls._read_by_host, *cls.shared))
         return tuple(p for section in sections for p in SECTIONS[section]) + tuple(cls.parameters)
 
     @classmethod
@@ -140,6 +141,7 @@ class Plant(Component):
     """The component that owns simulated time: it publishes the first stamp and advances when all have answered."""
 
     finished: bool = False
+    _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io", "lockstep")
 
     def begin(self) -> Outgoing:
         """Messages of step 0."""
