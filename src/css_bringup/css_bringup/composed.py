@@ -5,7 +5,6 @@ import gc
 import time
 from pathlib import Path
 
-from css_recording.recorder import RecorderNode
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
@@ -15,6 +14,7 @@ from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.node_process import create_node
 from css_common.plant_host import PlantNode
+from css_recording.recorder import RecorderNode
 
 _PROGRESS_EVERY = 0.2
 
@@ -82,14 +82,15 @@ class ComposedFlight:
         if not self.plant.start():
             result.failure = f"{self.plant.get_name()} did not start"
             return result
+        plant = self.plant
         try:
             # until the first step is out, partners are being matched: not part of the flight's time
-            self._spin(lambda: self.plant.begun or self.plant.done, None)
+            self._spin(lambda: plant.begun or plant.done, None)
             gc.collect()
             gc.freeze()
             wall, cpu = time.perf_counter(), time.process_time()
             try:
-                self._spin(lambda: self.plant.done, progress)
+                self._spin(lambda: plant.done, progress)
             finally:
                 result.wall_s = time.perf_counter() - wall
                 result.cpu_s = time.process_time() - cpu
@@ -126,13 +127,13 @@ class ComposedFlight:
             spin_until(self.executor, done, context=self.context)
             return
         epoch, plant = self.mission.epoch_ns, self.plant
-        last = time.monotonic()
+        due = 0.0
 
         def done_with_progress() -> bool:
-            nonlocal last
+            nonlocal due
             now = time.monotonic()
-            if now - last > _PROGRESS_EVERY:
-                last = now
+            if now > due:
+                due = now + _PROGRESS_EVERY
                 progress((plant.stamp_ns - epoch) * 1e-9)
             return done()
 

@@ -16,6 +16,8 @@ from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.utilities import get_default_context
 
+_CALLBACKS_BETWEEN_CHECKS = 64
+
 
 class DrainingExecutor(SingleThreadedExecutor):
     """Takes messages until every subscription is empty, then waits for whatever comes first."""
@@ -68,10 +70,14 @@ def spin_until(
         ExternalShutdownException: the ROS context was shut down from elsewhere.
     """
     context = context or get_default_context()
-    while not done():
+    spin_once = executor.spin_once
+    while True:
         if not context.ok():
             raise ExternalShutdownException
-        executor.spin_once(timeout_sec=interval)
+        for _ in range(_CALLBACKS_BETWEEN_CHECKS):
+            if done():
+                return
+            spin_once(timeout_sec=interval)
 
 
 def add_nodes(executor: Executor, nodes: Iterable[Node]) -> None:

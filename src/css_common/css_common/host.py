@@ -5,11 +5,13 @@ Parameters, topics, checks at the edge, stamp matching, scripted events, diagnos
 component; what only the node that owns simulated time does is in `css_common.plant_host`.
 """
 
+import contextlib
 import time
 import traceback
 from collections import Counter
 from functools import partial
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -20,14 +22,33 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from css_common import ros_parameters, sections
 from css_common.codec import Sample, codec_of
-from css_common.component import Component, Outgoing, Output
+from css_common.component import Component, Outgoing, Output, Plant
 from css_common.edge import Edge, Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
-from css_common.schema import ParameterError, shaped_values
+from css_common.schema import ParameterError, Values, shaped_values
 
 _SUCCESS = TransitionCallbackReturn.SUCCESS
 _FAILURE = TransitionCallbackReturn.FAILURE
+
+
+def rehearse(component_type: type[Component], name: str, values: Values) -> None:
+    """Cycles a stand-in of a component once on empty messages, so that its kernels are compiled before the flight.
+
+    Compiling takes seconds, loading compiled code a good part of one: not in the first cycle of a control loop.
+    """
+    stand_in = component_type(name, values)
+    received: dict[str, Sample | None] = {}
+    for source in component_type.inputs(name, values):
+        codec = codec_of(source.message_type)
+        lengths = {field: np.zeros(length) for field, length in source.lengths.items()}
+        sample = received[source.key] = codec.sample(stand_in.epoch_ns, "", **lengths)
+        codec.first_not_finite(codec.real_fields(), codec.decode(codec.encode(sample)))
+    # What a component makes of empty messages is its own affair; here only that it has been through it counts.
+    with contextlib.suppress(ArithmeticError, ValueError):
+        if isinstance(stand_in, Plant):
+            stand_in.begin()
+        stand_in.cycle(stand_in.epoch_ns, received)
 
 
 class ComponentNode(LifecycleNode):
@@ -150,6 +171,7 @@ class ComponentNode(LifecycleNode):
         self.component = self.component_type(name, shaped_values(self._table, self._canonical))
         values = self.component.values
         inputs = self.component_type.inputs(name, values)
+        rehearse(self.component_type, name, values)
         published = self.mission.topics
         awaited = [i.key for i in inputs if i.required or i.topic in published]
         self.matcher = Matcher(self.component, inputs, awaited)

@@ -79,7 +79,10 @@ class PlantNode(ComponentNode):
     # Start
 
     def _try_to_begin(self) -> None:
+        if self._begun or self.done:  # firings of the timer that were under way when it was destroyed
+            return
         absent = self._absent_partners()
+        rivals = self._rivals()
         lockstep = self.component.values.lockstep
         waited, limit = time.monotonic() - self._waiting_since, lockstep.startup_limit
         if absent and waited < limit:
@@ -87,10 +90,18 @@ class PlantNode(ComponentNode):
                 self._warned.update(absent)
                 self.get_logger().warning(f"the flight has not begun: {'; '.join(absent)}")
             return
+        if rivals and waited < lockstep.warn_after:
+            return  # a flight that has just ended may still be leaving
         self.destroy_timer(self._startup_timer)
         self._startup_timer = None
-        if absent:
+        if rivals:
+            self.failed = (
+                f"another node publishes {', '.join(rivals)}: two flights in one ROS_DOMAIN_ID answer each other; "
+                "end the other one or set another ROS_DOMAIN_ID"
+            )
+        elif absent:
             self.failed = f"after {limit:g} s still absent: {'; '.join(absent)}"
+        if self.failed:
             self.get_logger().error(self.failed)
             self.done = True
             return
@@ -100,11 +111,11 @@ class PlantNode(ComponentNode):
         self._mark_begin()
         self._go_to(self.mission.epoch_ns, outgoing)
 
+    def _rivals(self) -> list[str]:
+        return [topic for *_, topic in self._output_ports.values() if self.count_publishers(topic) > 1]
+
     def _absent_partners(self) -> list[str]:
         absent = []
-        for *_, topic in self._output_ports.values():
-            if self.count_publishers(topic) > 1:
-                absent.append(f"{topic} has a second publisher; another flight in this ROS_DOMAIN_ID must end first")
         recorders = self.component.values.lockstep.recorders
         for publisher, *_, topic in self._output_ports.values():
             expected = recorders + sum(

@@ -118,7 +118,7 @@ LOCKSTEP: Table = (
         low=0.1,
     ),
     integer("lockstep.recorders", 0, "-", "recorders that must be listening before the first step", low=0, high=16),
-    real("lockstep.startup_limit", 60.0, "s", "wall time allowed for all partners to appear", low=0.1),
+    real("lockstep.startup_limit", 180.0, "s", "wall time allowed for all partners to appear", low=0.1),
 )
 
 IO: Table = (

@@ -58,7 +58,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     print_result(console, result, runs)
     if result.failure:
         errors.print(f"[red]the flight failed:[/red] {result.failure}", soft_wrap=True)
-    missed = unmet(result, runs)
+    missed = unmet(result, runs) if result.bag is not None else []
     for line in missed:
         errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
     if as_json:
