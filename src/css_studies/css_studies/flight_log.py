@@ -45,6 +45,10 @@ _SINGLE = {
     "torque_command": (WheelTorqueCommand, "/wheels/torque_command"),
     "control": (ControlStatus, "/control/status"),
 }
+LOGGED_TYPES: dict[str, type] = {
+    f"css_msgs/msg/{kind.__name__}": kind for kind in (SunEstimate, *(kind for kind, _ in _SINGLE.values()))
+}
+"""Messages that a log holds, type name to class."""
 _ARRAY_NORMAL = next(p for p in SPACECRAFT if p.name == "spacecraft.array_normal")
 
 
@@ -94,6 +98,27 @@ class FlightLog:
         """All columns of the log, none of them empty."""
         single = [getattr(self, name) for name in _SINGLE]
         return [columns for columns in (*single, *self.estimates.values()) if columns is not None]
+
+    def add(self, topic: str, message_type: type, columns: Columns) -> None:
+        """Take the messages of a topic; types that no log holds, and topics without messages, are ignored.
+
+        Of several topics of a type that a flight has once, that under Sunpoint's own name is kept, else the first.
+        """
+        if len(columns) == 0:
+            return
+        if message_type is SunEstimate:
+            self.estimates[estimator_of(topic)] = columns
+            return
+        for attribute, (kind, usual) in _SINGLE.items():
+            if kind is not message_type:
+                continue
+            taken = getattr(self, attribute) is not None
+            if taken:
+                self.notes.append(
+                    f"of several topics with {kind.__name__} one is taken, {usual} if it is there"
+                )
+            if not taken or topic == usual:
+                setattr(self, attribute, columns)
 
     @cached_property
     def epoch_ns(self) -> int:
@@ -193,49 +218,32 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         BagError: it cannot be read, holds a damaged message, or none of the types that a flight is made of.
     """
     with BagReader(path, remap) as reader:
-        log = FlightLog(str(path))
+        mission, notes = None, []
         text = reader.mission_text
         if text is not None:
             try:
-                log.mission = mission_from_text(text, f"{path}: mission")
+                mission = mission_from_text(text, f"{path}: mission")
             except MissionError as error:
-                log.notes.append(f"the recorded mission is not valid here: {error}")
-        chosen = _chosen_topics(reader, log.notes)
-        if not chosen:
+                notes.append(f"the recorded mission is not valid here: {error}")
+        messages: dict[str, tuple[type, list[bytes]]] = {
+            topic.name: (LOGGED_TYPES[topic.type], [])
+            for topic, _ in reader.topics
+            if topic.type in LOGGED_TYPES
+        }
+        if not messages:
             raise BagError(f"{path}: holds no truth, Sun estimate, cell output, wheel or control message")
-        received: dict[str, list[bytes]] = {topic: [] for topic in chosen}
-        append = {topic: messages.append for topic, messages in received.items()}
-        for topic, _, _, data in reader.messages(received):
+        append = {topic: data.append for topic, (_, data) in messages.items()}
+        for topic, _, _, data in reader.messages(messages):
             append[topic](data)
-    for topic, (attribute, message_type) in chosen.items():
+    log = FlightLog(str(path), mission, notes=notes)
+    for topic, (message_type, data) in messages.items():
         try:
-            columns = stack(codec_of(message_type), received.pop(topic)).sorted()
+            log.add(topic, message_type, stack(codec_of(message_type), data).sorted())
         except DecodeError as error:
             raise BagError(f"{path}: topic {topic}: {error}") from error
-        if len(columns) == 0:
-            continue
-        if attribute:
-            setattr(log, attribute, columns)
-        else:
-            log.estimates[estimator_of(topic)] = columns
     return log
 
 
 def estimator_of(topic: str) -> str:
     """Name of the estimator that publishes a topic: `/ekf/sun_estimate` is of `ekf`."""
     return topic.removesuffix(ESTIMATE_SUFFIX).strip("/") or "sun_estimate"
-
-
-def _chosen_topics(reader: BagReader, notes: list[str]) -> dict[str, tuple[str, type]]:
-    """Topic to attribute of the log (empty: an estimate) and message class, of those that the log takes."""
-    by_type: dict[str, list[str]] = {}
-    for topic, _ in reader.topics:
-        by_type.setdefault(topic.type, []).append(topic.name)
-    chosen = {topic: ("", SunEstimate) for topic in by_type.get("css_msgs/msg/SunEstimate", ())}
-    for attribute, (message_type, usual) in _SINGLE.items():
-        topics = by_type.get(f"css_msgs/msg/{message_type.__name__}", [])
-        if topics:
-            topic = usual if usual in topics else topics[0]
-            chosen[topic] = (attribute, message_type)
-            notes += [f"{other} is left out, {topic} is taken" for other in topics if other != topic]
-    return chosen

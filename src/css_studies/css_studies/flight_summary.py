@@ -4,46 +4,47 @@
 from collections.abc import Iterable, Mapping
 from typing import TextIO
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from css_common.schema import unknown_name
 from css_studies.flight_metrics import QUANTITIES, Run
 
 _COLUMNS = {
-    "power_positive_s": ("converging\n[s]", "{:.1f}"),
-    "heading_error_mean_deg": ("heading error\nmean [deg]", "{:.2f}"),
-    "heading_error_p95_deg": ("heading error\n95 % [deg]", "{:.2f}"),
-    "pointing_error_mean_deg": ("pointing error\nmean [deg]", "{:.2f}"),
-    "rate_final_deg_s": ("final rate\n[deg/s]", "{:.3f}"),
-    "steps_without_estimate": ("steps without\nestimate", "{:d}"),
+    "power_positive_s": ("con-\nverging\n[s]", "{:.1f}"),
+    "heading_error_mean_deg": ("heading\nerror\nmean\n[deg]", "{:.2f}"),
+    "heading_error_p95_deg": ("heading\nerror\n95 %\n[deg]", "{:.2f}"),
+    "pointing_error_mean_deg": ("pointing\nerror\nmean\n[deg]", "{:.2f}"),
+    "rate_final_deg_s": ("final\nrate\n[deg/s]", "{:.3f}"),
+    "steps_without_estimate": ("steps\nwithout\nestimate", "{:d}"),
 }
 
 
 def summary_table(runs: Iterable[Run], title: str = "") -> Table:
-    """The runs as a table for a `rich` console; what is unknown or was never reached is a dash."""
-    table = Table(title=title or None, title_justify="left")
-    table.add_column("estimator")
+    """The runs as a table for a `rich` console; what is unknown or was never reached is a dash.
+
+    It fits into 80 columns, which is what a console has that is no terminal.
+    """
+    table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("estimator", no_wrap=True)
     table.add_column("gyro")
     for heading, _ in _COLUMNS.values():
-        table.add_column(heading, justify="right")
+        # as Text, because markup would take a unit for a style
+        table.add_column(Text(heading), justify="right")
     for run in runs:
-        values = (run.get(quantity) for quantity in _COLUMNS)
-        shown = (
-            "-" if value is None else text.format(value)
-            for value, (_, text) in zip(values, _COLUMNS.values(), strict=True)
-        )
-        table.add_row(run["estimator"] + (" (flown)" if run["flown"] else ""), run["gyro"], *shown)
+        shown = []
+        for quantity, (_, text) in _COLUMNS.items():
+            value = run[quantity]
+            shown.append("-" if value is None else text.format(value))
+        table.add_row(Text(run["estimator"] + (" (flown)" if run["flown"] else "")), run["gyro"], *shown)
     return table
 
 
 def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = None) -> None:
-    """Print the runs: a table with colours and lines on a terminal, plain text elsewhere."""
-    console = Console(file=file, highlight=False)
-    if not console.is_terminal:
-        # a pipe has no width: rows must not be broken
-        console = Console(file=file, highlight=False, no_color=True, width=140)
-    console.print(summary_table(runs, title))
+    """Print the runs, in colours on a terminal."""
+    Console(file=file, highlight=False).print(summary_table(runs, title))
 
 
 def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterable[Run]) -> list[str]:

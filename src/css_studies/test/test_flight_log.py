@@ -174,7 +174,7 @@ def test_a_second_truth_is_left_out_with_a_note(tmp_path):
         record(folder, {"/other": (SpacecraftState, random_columns(SpacecraftState, 3))} | topics)
     )
     assert len(log.truth) == STEPS
-    assert log.notes == ["/other is left out, /truth is taken"]
+    assert log.notes == ["of several topics with SpacecraftState one is taken, /truth if it is there"]
 
 
 def test_repeated_stamps_keep_the_later_answer():

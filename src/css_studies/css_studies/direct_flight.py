@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies a mission in this process, without ROS: the components that fly on topics, called one after the other.
+
+Sample sensors, estimate, control, propagate: the order follows from who listens to whom. A component gets the
+same values as from its topics, so the flight is the same as that of the composed graph.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from css_common.codec import Sample, codec_of
+from css_common.component import Component, Outgoing, Plant
+from css_common.mission import Event, Mission, MissionError, Node
+from css_common.schema import shaped_values
+from css_studies.flight_log import FlightLog
+from css_studies.message_columns import Columns
+
+
+def configured(
+    mission: Mission, *, case: int | None = None, estimator: str | None = None, gyro: bool = True
+) -> Mission:
+    """A mission with another case, another estimator in the place of the one that flies, the gyro on or off.
+
+    Raises:
+        MissionError: there is no such estimator.
+    """
+    if case is not None:
+        mission = mission.with_overrides([f"mission.case={case}"])
+    flown = mission.values.graph.estimator
+    if estimator is not None and estimator != flown:
+        present = any(node.name == estimator for node in mission.nodes)
+        entry = f"{mission.node(flown).package}/{estimator}"
+        nodes = [
+            entry if name == flown and not present else listed
+            for name, listed in zip((n.name for n in mission.nodes), mission.values.graph.nodes, strict=True)
+        ]
+        mission = mission.with_overrides([f"graph.nodes={','.join(nodes)}", f"graph.estimator={estimator}"])
+    name = mission.values.graph.estimator
+    return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
+
+
+def fly_directly(mission: Mission) -> FlightLog:
+    """Flies a mission to its end; the log holds what a recording of the flight would.
+
+    Raises:
+        MissionError: the mission has no plant, or its nodes wait for each other in a circle.
+    """
+    if mission.plant is None:
+        raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
+    *others, plant = [_Part(node, mission) for node in _in_order(mission)]
+    wires = {topic: _Wire(message_type, mission.steps) for topic, message_type in mission.topics.items()}
+    stamp_ns = mission.epoch_ns
+    plant.apply_events(stamp_ns)
+    outgoing = plant.component.begin()
+    while not plant.component.finished:
+        bus: dict[str, Sample] = {}
+        plant.publish(outgoing, wires, bus)
+        for part in others:
+            part.answer(stamp_ns, wires, bus)
+        outgoing = plant.component.cycle(stamp_ns, {key: bus.get(topic) for key, topic, *_ in plant.inputs})
+        stamp_ns += mission.period_ns
+        plant.apply_events(stamp_ns)
+    log = FlightLog(f"{mission.name}_{mission.values.mission.case}", mission)
+    for topic, message_type in mission.topics.items():
+        log.add(f"/{topic}", message_type, wires[topic].columns())
+    return log
+
+
+class _Wire:
+    """One topic: writes its messages into columns and hands them to the listeners of the same step.
+
+    Listeners see the kinds and shapes that a decoded message has, and a sender may reuse its arrays.
+    """
+
+    def __init__(self, message_type: type, messages: int) -> None:
+        self._fields = codec_of(message_type).fields
+        self._columns = Columns(np.zeros(messages, dtype=np.int64))
+        self._count = 0
+
+    def carry(self, sample: Sample) -> Sample:
+        """The message as a listener gets it."""
+        at, given, columns = self._count, vars(sample), vars(self._columns)
+        if at == 0:
+            self._allocate(given)
+        heard = Sample(sample.stamp_ns, sample.frame_id)
+        fields = vars(heard)
+        columns["stamp_ns"][at] = sample.stamp_ns
+        for field in self._fields:
+            column, value = columns[field.name], given[field.name]
+            column[at] = value
+            fields[field.name] = value if field.count is None else column[at]
+        self._count = at + 1
+        return heard
+
+    def columns(self) -> Columns:
+        """What was carried."""
+        return Columns(**{name: column[: self._count] for name, column in vars(self._columns).items()})
+
+    def _allocate(self, first: Mapping[str, Any]) -> None:
+        rows = len(self._columns)
+        for field in self._fields:
+            shape = (rows,) if field.count is None else (rows, field.count or len(first[field.name]))
+            vars(self._columns)[field.name] = np.zeros(shape, field.dtype)
+
+
+Wires = Mapping[str, _Wire]
+
+
+class _Part:
+    """A component of the flight with its wiring and what is to happen to it."""
+
+    def __init__(self, node: Node, mission: Mission) -> None:
+        self.component: Component | Plant = node.component(node.name, node.values)
+        self.inputs = [(i.key, i.topic, i.divider, i.required) for i in node.inputs]
+        self._topics = {output.key: output.topic for output in node.outputs}
+        self._canonical = dict(node.canonical)
+        self._events: list[Event] = [event for event in mission.events if event.node == node.name]
+        self._epoch_ns = mission.epoch_ns
+        self._is_active = True
+
+    def answer(self, stamp_ns: int, wires: Wires, bus: dict[str, Sample]) -> None:
+        """One cycle; none when an input that is due did not come."""
+        received = {key: bus.get(topic) for key, topic, _, _ in self.inputs}
+        step = self.component.step_of(stamp_ns)
+        for key, _, divider, required in self.inputs:
+            if required and received[key] is None and step % divider == 0:
+                return
+        if self._events:
+            self.apply_events(stamp_ns)
+        cycle = self.component.cycle if self._is_active else self.component.idle
+        self.publish(cycle(stamp_ns, received), wires, bus)
+
+    def publish(self, outgoing: Outgoing, wires: Wires, bus: dict[str, Sample]) -> None:
+        """Send what a component gave."""
+        for key, sample in outgoing.items():
+            topic = self._topics[key]
+            bus[topic] = wires[topic].carry(sample)
+
+    def apply_events(self, stamp_ns: int) -> None:
+        """What the mission scripts for this component up to a stamp."""
+        elapsed = (stamp_ns - self._epoch_ns) / 1e9
+        while self._events and elapsed >= self._events[0].time - 1e-9:
+            event = self._events.pop(0)
+            if event.action == "set":
+                self._canonical[event.parameter] = event.value
+                self.component.tune(shaped_values(self.component.table(), self._canonical))
+            elif event.action == "deactivate":
+                self._is_active = False
+            elif not self._is_active:
+                self._is_active = True
+                self.component.configure()
+
+
+def _in_order(mission: Mission) -> list[Node]:
+    """Nodes such that each comes after those it listens to; the plant, which begins the step, comes last."""
+    plant = mission.plant
+    known = {output.topic for output in plant.outputs}
+    waiting = [node for node in mission.nodes if node is not plant]
+    published = set(mission.topics)
+    order: list[Node] = []
+    while waiting:
+        ready = [n for n in waiting if all(i.topic in known or i.topic not in published for i in n.inputs)]
+        if not ready:
+            names = ", ".join(node.name for node in waiting)
+            raise MissionError(
+                f"{mission.origin}: {names} wait for each other, no order of calls serves them"
+            )
+        for node in ready:
+            known.update(output.topic for output in node.outputs)
+            waiting.remove(node)
+        order += ready
+    return [*order, plant]
