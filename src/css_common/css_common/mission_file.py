@@ -22,6 +22,13 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: ClassVar[dict] = {}
     bool_values: ClassVar[dict] = yaml.SafeLoader.bool_values | {"y": True, "n": False}
 
+    def fetch_plain(self) -> None:
+        super().fetch_plain()
+        token = self.tokens[-1]
+        if self.flow_level and ":" in token.value:
+            line = token.start_mark.line + 1
+            raise MissionError(f"line {line}: {token.value} given, expected quotes: ROS reads no colon inside brackets")
+
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         if self.check_event(yaml.AliasEvent):
             line = self.peek_event().start_mark.line + 1
@@ -46,16 +53,25 @@ class _Dumper(yaml.SafeDumper):
 
 
 def _plain(tag: str, pattern: str, first: Sequence[str]) -> None:
-    expression = re.compile(f"^(?:{pattern})$", re.IGNORECASE)
+    expression = re.compile(f"^(?:{pattern})$")
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{tag}", expression, list(first))
     _Dumper.add_implicit_resolver(f"tag:yaml.org,2002:{tag}", expression, list(first))
 
 
-_plain("bool", "y|yes|n|no|true|false|on|off", "yYnNtTfFoO")
-_plain("null", "~|null|", ["~", "n", "N", ""])
-_plain("int", r"[-+]?(0x[0-9a-f]+|0[0-7]*|[1-9]\d*)", "-+0123456789")
+def _integer(loader: _Loader, node: yaml.ScalarNode) -> int:
+    digits = node.value.lower()
+    return int(digits, 16 if "x" in digits else 8 if digits.lstrip("+-").startswith("0") else 10)
+
+
+_Loader.add_constructor("tag:yaml.org,2002:int", _integer)
+_truths = ("y", "yes", "n", "no", "true", "false", "on", "off")
+_plain("bool", "|".join(form for word in _truths for form in (word, word.title(), word.upper())), "yYnNtTfFoO")
+_plain("null", "~|null|Null|NULL|", ["~", "n", "N", ""])
+_plain("int", r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9]\d*)", "-+0123456789")
 _plain(
-    "float", r"[-+]?(\d+\.?\d*e[-+]?\d+|\d+\.\d*|\.\d+(e[-+]?\d+)?|\.inf)|\.nan", "-+0123456789."
+    "float",
+    r"[-+]?(\d+\.?\d*[eE][-+]?\d+|\d+\.\d*|\.\d+([eE][-+]?\d+)?|\.(inf|Inf|INF))|\.(nan|NaN|NAN)",
+    "-+0123456789.",
 )
 
 

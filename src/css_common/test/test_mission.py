@@ -17,7 +17,7 @@ from css_msgs.msg import CssVoltages, SunEstimate
 HEAD = """\
 /**:
   ros__parameters:
-    mission: {name: bench, duration: 1.0, period: 0.1, epoch: 2013-06-01T00:00:00Z}
+    mission: {name: bench, duration: 1.0, period: 0.1, epoch: '2013-06-01T00:00:00Z'}
     graph: {nodes: [testbed/source, testbed/gyro, testbed/estimator, testbed/controller], estimator: estimator}
 """
 
@@ -29,7 +29,7 @@ def mission_of(lines: str = "", *overrides: str, nodes: str = ""):
 
 def graph_of(*entries: str, lines: str = ""):
     """A mission of other nodes."""
-    text = f"/**: {{ros__parameters: {{graph: {{nodes: [{', '.join(entries)}], estimator: estimator}}, {lines}}}}}"
+    text = f"/**: {{ros__parameters: {{graph: {{nodes: {list(entries)}, estimator: estimator}}, {lines}}}}}"
     return mission_from_text(text, "bench.yaml")
 
 
@@ -65,7 +65,7 @@ def test_numbers_with_exponents_are_numbers(written, value):
 
 @pytest.mark.parametrize("word", ["2013-06-01", "2013-06-01T00:00:00Z", "1:30", "1_000", "0o17", "e5", "=", "x"])
 def test_words_that_yaml_makes_something_else_of_are_texts_as_in_ros(word):
-    assert mission_of(nodes=f"estimator: {{ros__parameters: {{note: {word}}}}}").node("estimator").values.note == word
+    assert mission_of(nodes=f"estimator:\n  ros__parameters:\n    note: {word}\n").node("estimator").values.note == word
 
 
 def test_keys_are_words_as_in_ros():
