@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Properties of the cells' outputs that hold for any attitude, light, fault and setting."""
+
+import math
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from css_common.random_streams import random_key
+from css_common.schema import default_values
+from css_common.sections import CELLS, MISSION
+from css_sim import cell_errors, cell_screen, sun_cells
+
+fraction = st.floats(0.0, 1.0)
+anything = st.floats(allow_nan=True, allow_infinity=True)
+lights = st.lists(st.one_of(st.floats(0.0, 2.0), anything), min_size=8, max_size=8)
+
+
+@st.composite
+def set_ups(draw):
+    """Parameters and cells with every effect possibly on."""
+    low = draw(st.floats(-1.0, 0.5))
+    own = sun_cells.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS
+    values = default_values(
+        MISSION + CELLS + own,
+        warp=draw(st.booleans()),
+        degradation=draw(fraction),
+        degradation_mode=draw(st.sampled_from(["common", "per_cell"])),
+        noise=draw(fraction),
+        dropout=draw(fraction),
+        output_low=low,
+        output_high=low + draw(st.floats(0.1, 3.0)),
+        bits=draw(st.integers(0, 16)),
+        faults=draw(st.lists(st.sampled_from(["1 dead", "2 stuck 0.7", "3 noisy 0.5", "2 stuck -9.0"]), max_size=3)),
+        scale_cell_error=draw(fraction),
+        bias=draw(fraction),
+        misalignment_deg=draw(st.floats(0.0, 45.0)),
+    )
+    nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
+    cells = nominal.copy()
+    cell_errors.draw_cells(cell_errors.error_model(values), random_key(draw(st.integers(0, 99)), 0), nominal, cells)
+    return sun_cells.parameters(values), cells
+
+
+@settings(max_examples=300, deadline=None)
+@given(set_ups(), st.tuples(anything, anything, anything), anything, lights, st.integers(0, 2**31))
+def test_outputs_are_numbers_inside_the_limits_and_flagged_at_the_top(set_up, sun_b, intensity, albedo, step):
+    p, cells = set_up
+    voltages = np.full(8, math.nan)
+    mask = sun_cells.sample(p, cells, random_key(1, 0), step, sun_b, intensity, np.array(albedo), voltages)
+    assert np.all(voltages >= p.output_low) and np.all(voltages <= p.output_high)
+    top = p.output_high - ((p.output_high - p.output_low) / p.levels if p.levels else 0.0)
+    for i, v in enumerate(voltages):
+        assert bool(mask >> i & 1) == (v == top)
+    if p.levels:
+        codes = (voltages - p.output_low) / (p.output_high - p.output_low) * p.levels
+        np.testing.assert_allclose(codes, np.round(codes), atol=1e-6)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(0.0, math.pi), st.floats(-math.pi, math.pi), st.floats(0.0, 1.4), st.floats(0.01, 0.99))
+def test_more_light_never_reads_less(polar, azimuth, intensity, part):
+    # the warp of Eq. 16 rises with the output it bends, so the whole chain does
+    own = sun_cells.PARAMETERS + cell_screen.PARAMETERS
+    values = default_values(MISSION + CELLS + own)
+    p = sun_cells.parameters(values)
+    cells = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
+    sun_b = (math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar))
+    bright, dim = np.zeros(8), np.zeros(8)
+    sun_cells.sample(p, cells, random_key(1, 0), 3, sun_b, intensity, np.full(8, 0.1), bright)
+    sun_cells.sample(p, cells, random_key(1, 0), 3, sun_b, part * intensity, np.full(8, 0.1), dim)
+    assert np.all(bright >= dim)
