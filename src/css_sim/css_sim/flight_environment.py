@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The true environment along a mission's orbit, at any time of its flight."""
 
+from functools import lru_cache
+
 from css_common.epochs import parse_utc
 from css_common.schema import Table, Values, choice, flag
 from css_environment import ephemeris
@@ -30,6 +32,10 @@ def orbit(values: Values) -> Orbit:
     )
 
 
+# Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
+_segment_tables = lru_cache(maxsize=4)(ephemeris.build_ephemeris)
+
+
 class FlightEnvironment:
     """Tables of the segment that was asked for last."""
 
@@ -43,7 +49,7 @@ class FlightEnvironment:
     def tables(self, elapsed_s: float) -> Ephemeris:
         """Tables that hold an instant [s after the epoch]."""
         if self._tables is None or not ephemeris.covers(self._tables, elapsed_s):
-            self._tables = ephemeris.build_ephemeris(
+            self._tables = _segment_tables(
                 self._orbit,
                 self._epoch_ns,
                 ephemeris.segment_start(elapsed_s),
