@@ -18,9 +18,7 @@ def dcm_en_at(epoch_ns: int, elapsed_s: float = 0.0) -> Mat3:
     """
     return tuple(
         tuple(float(value) for value in row)
-        for row in erfa.c2t06a(
-            *terrestrial_date(epoch_ns, elapsed_s), *utc_date(epoch_ns, elapsed_s), 0.0, 0.0
-        )
+        for row in erfa.c2t06a(*terrestrial_date(epoch_ns, elapsed_s), *utc_date(epoch_ns, elapsed_s), 0.0, 0.0)
     )
 
 

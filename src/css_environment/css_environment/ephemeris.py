@@ -161,9 +161,7 @@ def _combine(values, rates, k: int, weights) -> Vec3:
 def _hermite(values, rates, k: int, u: float, h: float) -> Vec3:
     """Cubic between knots k and k + 1, h seconds apart, at the fraction u, from values and rates at both."""
     v = 1.0 - u
-    return _combine(
-        values, rates, k, (v * v * (1.0 + 2.0 * u), h * u * v * v, u * u * (3.0 - 2.0 * u), -h * u * u * v)
-    )
+    return _combine(values, rates, k, (v * v * (1.0 + 2.0 * u), h * u * v * v, u * u * (3.0 - 2.0 * u), -h * u * u * v))
 
 
 @kernel

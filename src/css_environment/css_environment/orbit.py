@@ -52,9 +52,7 @@ def keplerian_orbit(
             f"got {semi_major_axis_m} m and {eccentricity}"
         )
     angles = (inclination_deg, raan_deg, argument_of_perigee_deg, true_anomaly_deg)
-    return KeplerianOrbit(
-        semi_major_axis_m, eccentricity, *map(math.radians, angles), EARTH_J2 if j2_drift else 0.0
-    )
+    return KeplerianOrbit(semi_major_axis_m, eccentricity, *map(math.radians, angles), EARTH_J2 if j2_drift else 0.0)
 
 
 def orbit_period(orbit: KeplerianOrbit) -> float:
@@ -98,12 +96,8 @@ def _keplerian_states(orbit: KeplerianOrbit, t: np.ndarray):
     cos_w, sin_w = np.cos(perigee), np.sin(perigee)
     cos_i, sin_i = math.cos(orbit.inclination), math.sin(orbit.inclination)
     # Unit vectors along the perigee, along the semi-latus rectum and along the orbit normal.
-    p = np.stack(
-        (cos_o * cos_w - sin_o * sin_w * cos_i, sin_o * cos_w + cos_o * sin_w * cos_i, sin_w * sin_i), 1
-    )
-    q = np.stack(
-        (-cos_o * sin_w - sin_o * cos_w * cos_i, -sin_o * sin_w + cos_o * cos_w * cos_i, cos_w * sin_i), 1
-    )
+    p = np.stack((cos_o * cos_w - sin_o * sin_w * cos_i, sin_o * cos_w + cos_o * sin_w * cos_i, sin_w * sin_i), 1)
+    q = np.stack((-cos_o * sin_w - sin_o * cos_w * cos_i, -sin_o * sin_w + cos_o * cos_w * cos_i, cos_w * sin_i), 1)
     w = np.stack((sin_o * sin_i, -cos_o * sin_i, np.full_like(t, cos_i)), 1)
     r_n = x[:, None] * p + y[:, None] * q
     v_n = vx[:, None] * p + vy[:, None] * q

@@ -48,9 +48,7 @@ def test_position_velocity_and_sun(tabulated):
     assert np.abs(np.array([s.r_n for s in states]) - r).max() < 1e-3
     assert np.abs(np.array([s.v_n for s in states]) - v).max() < 1e-3
     assert np.abs(np.array([s.sun_n for s in states]) - sun).max() < 1e-9
-    np.testing.assert_allclose(
-        [s.solar_flux for s in states], (ASTRONOMICAL_UNIT / distance) ** 2, rtol=1e-10
-    )
+    np.testing.assert_allclose([s.solar_flux for s in states], (ASTRONOMICAL_UNIT / distance) ** 2, rtol=1e-10)
 
 
 def test_tle_orbit_is_interpolated_as_well():

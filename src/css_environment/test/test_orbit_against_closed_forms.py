@@ -40,9 +40,7 @@ def test_two_body_motion_keeps_energy_momentum_and_eccentricity_vector(a, e, inc
     energy = 0.5 * np.sum(v * v, 1) - EARTH_MU / np.linalg.norm(r, axis=1)
     np.testing.assert_allclose(energy, -EARTH_MU / (2.0 * a), rtol=1e-9)
     momentum = np.cross(r, v)
-    np.testing.assert_allclose(
-        np.linalg.norm(momentum, axis=1), math.sqrt(EARTH_MU * a * (1 - e * e)), rtol=1e-10
-    )
+    np.testing.assert_allclose(np.linalg.norm(momentum, axis=1), math.sqrt(EARTH_MU * a * (1 - e * e)), rtol=1e-10)
     normal = momentum / np.linalg.norm(momentum, axis=1)[:, None]
     np.testing.assert_allclose(normal[:, 2], math.cos(math.radians(inclination)), atol=1e-10)
     toward_perigee = np.cross(v, momentum) / EARTH_MU - r / np.linalg.norm(r, axis=1)[:, None]
@@ -79,9 +77,7 @@ def test_node_drifts_with_the_sun_on_the_clark_orbit():
 
 def test_perigee_stands_still_at_the_critical_inclination():
     critical = math.degrees(math.acos(math.sqrt(0.2)))
-    assert secular_rates(keplerian_orbit(2.6e7, 0.7, critical, j2_drift=True))[2] == pytest.approx(
-        0.0, abs=1e-18
-    )
+    assert secular_rates(keplerian_orbit(2.6e7, 0.7, critical, j2_drift=True))[2] == pytest.approx(0.0, abs=1e-18)
 
 
 @pytest.mark.parametrize("j2_drift", [False, True])
@@ -129,5 +125,5 @@ def test_a_tle_that_sgp4_cannot_propagate_says_when():
         "1 33333U 05037B   05333.02012661  .25992681  00000-0  24476-3 0  1534",
         "2 33333  96.4736 157.9986 9950000 244.0492 110.6523  4.00004038 10708",
     )
-    with pytest.raises(ValueError, match="SGP4 fails .* s after the epoch"):
+    with pytest.raises(ValueError, match=r"SGP4 fails .* s after the epoch"):
         orbit_states(decayed, EPOCH_2013, [0.0])

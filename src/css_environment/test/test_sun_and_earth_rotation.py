@@ -53,9 +53,7 @@ def test_direction_counts_from_the_spacecraft():
     r_n = np.array([[7e6, 0.0, 0.0], [0.0, 4.2e7, 0.0]])
     epoch_ns = EPOCHS["2013-06-01"] * 10**9
     direction, distance = sun_directions(epoch_ns, [0.0, 100.0], r_n)
-    np.testing.assert_allclose(
-        r_n + direction * distance[:, None], sun_positions(epoch_ns, [0.0, 100.0]), rtol=1e-12
-    )
+    np.testing.assert_allclose(r_n + direction * distance[:, None], sun_positions(epoch_ns, [0.0, 100.0]), rtol=1e-12)
 
 
 @pytest.mark.parametrize("unix_s", EPOCHS.values(), ids=EPOCHS.keys())
@@ -64,9 +62,7 @@ def test_earth_turns_by_sidereal_time(unix_s):
     dcm = np.array(dcm_en_at(unix_s * 10**9))
     centuries = (unix_s / 86400.0 + 2_440_587.5 - 2_451_545.0) / 36525.0
     gmst = 67310.54841 + (876600 * 3600 + 8640184.812866) * centuries + 0.093104 * centuries**2
-    precession_in_right_ascension = (
-        1.2812 * centuries
-    )  # [deg] general precession m, equinox of date against J2000
+    precession_in_right_ascension = 1.2812 * centuries  # [deg] general precession m, equinox of date against J2000
     angle = math.degrees(math.atan2(dcm[0, 1], dcm[0, 0]))
     difference = angle - (gmst / 240.0 - precession_in_right_ascension)
     assert abs((difference + 180.0) % 360.0 - 180.0) < 0.01

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sunlight that the Earth reflects onto the cells of a spacecraft (O'Keefe & Schaub 2013, Eq. 17).
+
+`earth_light.albedo_sources` reduces the sunlit Earth to 32 patches of light, once per instant for all cells and all
+cases. `albedo_output` sums them for each cell of one attitude, within the cell's cone of view and on its side of a
+screen. Light and mean direction of a patch make the sum exact for patches that a cell sees whole. One that is cut
+by the edge of the cone or of the screen is taken as evenly bright over its size and cut in proportion, so that
+outputs change smoothly with attitude and few patches are enough.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.vectors import Mat3, Vec3, dot, multiply_transposed
+from css_environment.earth_light import (
+    DISC,
+    DISC_COS,
+    DISC_LIGHT,
+    DISC_SIN,
+    LIGHT,
+    PATCHES,
+    SIZE,
+    X,
+    Y,
+    Z,
+    aligned_rows,
+)
+
+# Single precision: seven digits are plenty for a sum good to three, and twice as many fit into a vector register.
+_F = np.float32
+_ZERO, _HALF, _ONE = _F(0.0), _F(0.5), _F(1.0)
+
+# Rows of the workspace. For cells free of the screen, on its positive and on its negative side: light of each patch
+# that passes the screen, and in the next row how far the cut moves the patch along the (mirrored) axis.
+_FREE, _POSITIVE, _NEGATIVE = 0, 2 * PATCHES, 4 * PATCHES
+_TERMS = 6 * PATCHES
+
+# A cone narrower than the patches would need finer ones; its edge is not softened below this sine.
+_NARROWEST_SIN = 0.05
+
+
+class Screen(NamedTuple):
+    """Structure that hides part of the sky from cells: a body plane, or the collar of a group of cells.
+
+    A cell whose `side` is positive receives all of the light from directions whose cosine to the axis is at least
+    `full_cos`, none below `dark_cos`, a linear part between. If `side` is negative the axis is mirrored; if zero
+    nothing is hidden.
+    """
+
+    axis_b: Vec3  # unit vector, or zeros: no screen
+    dark_cos: float
+    full_cos: float
+
+
+def plane_screen(normal_b) -> Screen:
+    """Body plane that hides the half space beyond it from each cell, with a sharp edge; zeros: no screen."""
+    x, y, z = (float(c) for c in normal_b)
+    return Screen((x, y, z), 0.0, 0.0)
+
+
+def collar_screen(axis_b, full_angle: float, dark_angle: float) -> Screen:
+    """Collar about an axis: all light within `full_angle` [rad] of it, none beyond `dark_angle`."""
+    x, y, z = (float(c) for c in axis_b)
+    return Screen((x, y, z), math.cos(dark_angle), math.cos(full_angle))
+
+
+def new_workspace() -> np.ndarray:
+    """Room for `albedo_output` to work in, (224,) float32; each thread needs its own."""
+    return aligned_rows(7)
+
+
+@kernel
+def transmission(screen: Screen, side: float, direction_b: Vec3) -> float:
+    """Part of the light of a point source that a screen lets pass to a cell of the given side, 0 to 1."""
+    if side == 0.0 or dot(screen.axis_b, screen.axis_b) == 0.0:
+        return 1.0
+    cosine = dot(screen.axis_b, direction_b) * (1.0 if side > 0.0 else -1.0)
+    if cosine >= screen.full_cos:
+        return 1.0
+    if cosine <= screen.dark_cos:
+        return 0.0
+    return (cosine - screen.dark_cos) / (screen.full_cos - screen.dark_cos)
+
+
+@kernel
+def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Mat3, work, output) -> None:
+    """Light of the Earth that each cell receives [-], 1.0 being the Sun at normal incidence at 1 AU.
+
+    Args:
+        light: patches from `earth_light.albedo_sources`.
+        cells: (N,) records with the fields nx, ny, nz (outward unit normal in b) and side (see `Screen`).
+        screen: what hides part of the sky.
+        cos_half_view: cosine of half the full cone of view, 0 to 1.
+        dcm_bn: rotation from n to b.
+        work: room from `new_workspace`.
+        output: (N,) written.
+    """
+    nadir_n = (float(light[DISC]), float(light[DISC + 1]), float(light[DISC + 2]))
+    sin_half_view = math.sqrt(max(0.0, 1.0 - cos_half_view * cos_half_view))
+    # Cells that look away from nadir by more than half their view and half the Earth's see nothing of it.
+    reach_cos = cos_half_view * light[DISC + DISC_COS] - sin_half_view * light[DISC + DISC_SIN]
+    if light[DISC + DISC_LIGHT] <= 0.0:
+        reach_cos = 2.0
+    edge_sin = max(_NARROWEST_SIN, sin_half_view)
+    axis_n = multiply_transposed(dcm_bn, screen.axis_b)
+    has_screen = dot(axis_n, axis_n) > 0.0
+    ax, ay, az = _F(axis_n[0]), _F(axis_n[1]), _F(axis_n[2])
+    middle = 0.5 * (screen.full_cos + screen.dark_cos)
+    screen_sin = _F(math.sqrt(max(0.0, 1.0 - middle * middle)))
+    ramp = _F(0.5 * (screen.full_cos - screen.dark_cos))
+    middle = _F(middle)
+    for j in range(PATCHES):
+        cosine = light[X + j] * ax + light[Y + j] * ay + light[Z + j] * az
+        size = light[SIZE + j] * screen_sin
+        size2 = size * size
+        inverse = _ONE / np.sqrt(size2 + ramp * ramp)
+        part = min(max(_HALF + _HALF * (cosine - middle) * inverse, _ZERO), _ONE)
+        work[_POSITIVE + j] = light[LIGHT + j] * part
+        work[_POSITIVE + PATCHES + j] = (_ONE - part) * size2 * inverse
+        part = min(max(_HALF - _HALF * (cosine + middle) * inverse, _ZERO), _ONE)
+        work[_NEGATIVE + j] = light[LIGHT + j] * part
+        work[_NEGATIVE + PATCHES + j] = (_ONE - part) * size2 * inverse
+        work[_FREE + j] = light[LIGHT + j]
+        work[_FREE + PATCHES + j] = _ZERO
+    edge, spread = _F(cos_half_view), _F(edge_sin)
+    for i in range(output.shape[0]):
+        normal_n = multiply_transposed(dcm_bn, (cells[i].nx, cells[i].ny, cells[i].nz))
+        output[i] = 0.0
+        if dot(normal_n, nadir_n) > reach_cos:
+            x, y, z = _F(normal_n[0]), _F(normal_n[1]), _F(normal_n[2])
+            side = cells[i].side if has_screen else 0.0
+            shift = _F(dot(normal_n, axis_n))
+            if side < 0.0:
+                shift = -shift
+            for j in range(PATCHES):
+                if side > 0.0:
+                    passed, moved = work[_POSITIVE + j], work[_POSITIVE + PATCHES + j]
+                elif side < 0.0:
+                    passed, moved = work[_NEGATIVE + j], work[_NEGATIVE + PATCHES + j]
+                else:
+                    passed, moved = work[_FREE + j], work[_FREE + PATCHES + j]
+                mean = light[X + j] * x + light[Y + j] * y + light[Z + j] * z + moved * shift
+                width = light[SIZE + j] * spread
+                high = mean + width
+                low = min(max(mean - width, edge), high)
+                work[_TERMS + j] = passed * (high - low) * (high + low)
+            a, b, c, d = _ZERO, _ZERO, _ZERO, _ZERO
+            for j in range(0, PATCHES, 4):
+                a += work[_TERMS + j]
+                b += work[_TERMS + j + 1]
+                c += work[_TERMS + j + 2]
+                d += work[_TERMS + j + 3]
+            total = (a + b) + (c + d)
+            output[i] = float(total) / edge_sin
