@@ -10,6 +10,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
@@ -121,7 +122,7 @@ def mission_text(telemetry: Telemetry, layout: CellLayout, name: str, period_s: 
 
 def _examine(rows: list[TelemetryRow], source: Path, report: ImportReport) -> list[float]:
     """Fills in what the table tells about itself; gives the steps of time [s]."""
-    steps = [(b.stamp_ns - a.stamp_ns) * 1e-9 for a, b in zip(rows, rows[1:], strict=False)]
+    steps = [(b.stamp_ns - a.stamp_ns) * 1e-9 for a, b in pairwise(rows)]
     report.period_s = round(median(steps), 6) if steps else _LONGEST_PERIOD_S
     report.gaps = sum(step > 1.5 * report.period_s for step in steps)
     outputs = [value for row in rows for value in row.cells if not math.isnan(value)]

@@ -20,12 +20,12 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
 from css_common.codec import stamp_of
+from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_recording.bag_reader import BagMessage, BagReader
 from css_recording.errors import BagError
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
-from css_recording.ros_topics import live_qos, matching_qos, message_class_of, publishers_of_others
+from css_recording.ros_topics import matching_qos, message_class_of, publishers_of_others
 
-_DEPTH = 100
 _SETTLED_AFTER = 1.0
 _SETTLE_LIMIT = 10.0
 _LOOK_EVERY = 1.0
@@ -42,8 +42,16 @@ class PlayerNode(Node):
         *,
         context: Context | None = None,
         use_global_arguments: bool = True,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         """Prepares playback; `play` does it.
+
+        Args:
+            reader: the recording.
+            options: how to play it.
+            context: ROS context.
+            use_global_arguments: False in a process of several nodes, where one command line serves them all.
+            now: wall clock [s] that paces the playback.
 
         Raises:
             BagError: the recording lacks a topic that the options name.
@@ -65,6 +73,7 @@ class PlayerNode(Node):
         self._pace = pace or max(chosen, key=lambda name: counts[name], default="")
         if self._pace not in chosen:
             raise BagError(f"{reader.path}: no topic {self._pace} to pace the playback")
+        self._now = now
         self._executor: Executor | None = None
         self._stopped: Callable[[], bool] = lambda: False
 
@@ -116,9 +125,8 @@ class PlayerNode(Node):
                 self.report.not_installed.append(topic.name)
                 self.get_logger().warning(f"{topic.name} is not played: {error}")
                 continue
-            self._publishers_by_topic[topic.name] = self.create_publisher(
-                message_class, topic.name, live_qos(topic.qos, _DEPTH)
-            )
+            # The strongest offer, whatever was recorded: a node that asks for less is matched all the same.
+            self._publishers_by_topic[topic.name] = self.create_publisher(message_class, topic.name, LOOP_PUBLISHER)
             self.report.published[topic.name] = 0
 
     def _meet_partners(self) -> None:
@@ -143,7 +151,7 @@ class PlayerNode(Node):
             message_class_of(publishers[0].topic_type),
             topic,
             partial(self._note_answer, topic),
-            matching_qos(publishers, _DEPTH),
+            matching_qos(publishers, LOOP_SUBSCRIPTION.depth),
             raw=True,
         )
         self._wait(lambda: subscription.get_publisher_count() > 0, f"{topic} cannot be heard")
@@ -163,16 +171,16 @@ class PlayerNode(Node):
     def _publish_all(self) -> None:
         self._answered = dict.fromkeys(self._answered, -1)
         start_ns = self._reader.start_ns + round(self._options.start * 1e9)
-        began = time.monotonic()
-        looked = began
+        began = looked = self._now()
         for stamp_ns, messages in self._by_stamp(start_ns):
             due = began + (stamp_ns - start_ns) * 1e-9 / self._options.rate
-            while not self._stopped() and time.monotonic() < due:
-                self._spin(min(_SPIN, max(0.0, due - time.monotonic())))
+            self._spin(0.0)  # also when it is late: nodes of this process must get their turn
+            while not self._stopped() and self._now() < due:
+                self._spin(min(_SPIN, max(0.0, due - self._now())))
             if self._stopped():
                 return
-            if time.monotonic() - looked > _LOOK_EVERY:
-                looked = time.monotonic()
+            if self._now() - looked > _LOOK_EVERY:
+                looked = self._now()
                 self._give_way()
             paced = self._publish_group(stamp_ns, messages)
             if paced and self._answered:

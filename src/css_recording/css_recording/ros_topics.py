@@ -47,19 +47,6 @@ def recorded_qos(profile: QoSProfile) -> QosProfile:
     )
 
 
-def live_qos(profiles: Iterable[QosProfile], depth: int) -> QoSProfile:
-    """Quality of service with which to publish what was recorded with these profiles."""
-    profiles = list(profiles)
-    best_effort = any(profile.reliability == "best_effort" for profile in profiles)
-    latched = bool(profiles) and all(profile.durability == "transient_local" for profile in profiles)
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=ReliabilityPolicy.BEST_EFFORT if best_effort else ReliabilityPolicy.RELIABLE,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )
-
-
 def matching_qos(publishers: Iterable[TopicEndpointInfo], depth: int) -> QoSProfile:
     """The strictest subscription that matches every one of the publishers.
 

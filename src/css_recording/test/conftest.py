@@ -3,14 +3,18 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rclpy.context import Context
+from rclpy.node import Node
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from css_common.executor import create_executor
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.schemas import dependencies, schema_of
@@ -96,3 +100,47 @@ def doctor() -> Callable[[Path], str]:
         return run.stdout
 
     return check
+
+
+class Graph:
+    """A ROS context with an executor, and nodes that go with it."""
+
+    def __init__(self) -> None:
+        self.context = Context()
+        self.context.init()
+        self.executor = create_executor(context=self.context)
+        self.options = {"context": self.context, "use_global_arguments": False}
+        self.nodes: list[Node] = []
+
+    def add(self, node):
+        """Put a node into the executor."""
+        self.nodes.append(node)
+        self.executor.add_node(node)
+        return node
+
+    def node(self, name: str) -> Node:
+        """A plain node."""
+        return self.add(Node(name, **self.options))
+
+    def spin_until(self, condition: Callable[[], bool], limit: float = 30.0) -> None:
+        """Run callbacks until something is so."""
+        end = time.monotonic() + limit
+        while not condition():
+            assert time.monotonic() < end, "it never came to pass"
+            self.executor.spin_once(timeout_sec=0.02)
+
+    def close(self) -> None:
+        """Take everything down."""
+        for node in self.nodes:
+            self.executor.remove_node(node)
+            node.destroy_node()
+        self.executor.shutdown()
+        self.context.try_shutdown()
+
+
+@pytest.fixture
+def graph() -> Iterator[Graph]:
+    """An empty graph."""
+    graph = Graph()
+    yield graph
+    graph.close()

@@ -66,7 +66,7 @@ def _summary(report: ImportReport) -> str:
         lines.append(f"columns not used: {', '.join(report.ignored_columns)}")
     if report.largest_output > 1.5:
         lines.append(
-            f"the largest cell output is {report.largest_output:.3g}; 1 is the Sun at normal incidence, see --full-scale"
+            f"the largest cell output is {report.largest_output:.3g}; 1 is the Sun met head-on, see --full-scale"
         )
     return "\n".join(lines)
 

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 
 import rclpy
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 
 from css_common.executor import create_executor
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
 from css_recording.player import PlayerNode
-from css_recording.stop_signal import StopSignal
+from css_recording.process import StopSignal, split_arguments
 
 _DESCRIPTION = """\
 Publish a recording to live nodes. Topics that a live node publishes are left to it. With --wait-for the playback is
@@ -26,15 +25,15 @@ Exit code: 0 played or stopped by a signal, 1 the recording cannot be read or a 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
+    own, for_ros = split_arguments(sys.argv[1:] if arguments is None else arguments)
     parser = _parser()
-    options = parser.parse_args(remove_ros_args(["player", *given])[1:])
+    options = parser.parse_args(own)
     try:
         remap = dict(_renaming(text) for text in options.remap)
     except ValueError as error:
         parser.error(str(error))
     stop = StopSignal()
-    rclpy.init(args=["player", *given], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=["player", *for_ros], signal_handler_options=SignalHandlerOptions.NO)
     try:
         with BagReader(options.recording, remap) as reader:
             print(_summary(_play(reader, options, stop)))

@@ -12,15 +12,14 @@ from typing import Any
 import rclpy
 from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.utilities import remove_ros_args
 
 from css_common.executor import create_executor, spin_until
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
+from css_recording.process import StopSignal, split_arguments
 from css_recording.recorder import RecorderNode
-from css_recording.stop_signal import StopSignal
 
 _DESCRIPTION = """\
 Record topics into an MCAP recording in rosbag2 layout, until SIGINT or SIGTERM. Log times are the stamps of the
@@ -36,8 +35,8 @@ _DRAIN_LIMIT_S = 5.0
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    options = _parser().parse_args(remove_ros_args(["recorder", *given])[1:])
+    own, for_ros = split_arguments(sys.argv[1:] if arguments is None else arguments)
+    options = _parser().parse_args(own)
     stop = StopSignal()
     try:
         mission = load_mission(options.mission, options.set) if options.mission else None
@@ -46,7 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     folder = Path(options.output) if options.output else fresh_folder(mission.name if mission else "recording")
     # Signals are handled here: rclpy would shut its context down with messages still waiting to be taken.
-    rclpy.init(args=["recorder", *given], signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=["recorder", *for_ros], signal_handler_options=SignalHandlerOptions.NO)
     try:
         return _record(options, mission, folder, stop)
     except BagError as error:

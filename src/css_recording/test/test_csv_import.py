@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A table of telemetry becomes the recording that it describes, or is refused by line and column."""
+
+import math
+import textwrap
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from rosbags.highlevel import AnyReader
+
+from css_common.mission_file import flattened, read_sections
+from css_common.schema import checked_values
+from css_common.sections import SECTIONS
+from css_recording.bag_reader import BagReader
+from css_recording.cell_layout import CellLayout, read_layout
+from css_recording.commands.import_csv import main
+from css_recording.csv_import import import_telemetry
+from css_recording.errors import BagError
+from css_recording.telemetry_table import read_telemetry
+
+LAYOUT = CellLayout(("c1", "c2"), ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8)))
+EPOCH_NS = 1_370_044_800_000_000_000
+TABLE = """\
+    # flight 7, morning pass
+    time; c1; c2; temperature; omega_x_deg_s; omega_y_deg_s; omega_z_deg_s; sun_x; sun_y; sun_z
+    2013-06-01T00:00:00Z; 0.5; 0.25; 20; 1; 2; -3; 0; 0; 2
+
+    2013-06-01T00:00:00.1Z; ; 0.5; 20; 1; ; -3; 0; 3; 4
+    2013-06-01T00:00:00.2Z; nan; NA; 21; 1; 2; 3; -; 3; 4
+    2013-06-01T00:00:01Z; 1; -0.01; 21; 0; 0; 0; 1; 0; 0
+"""
+
+
+def table(tmp_path, text):
+    path = tmp_path / "table.csv"
+    path.write_text(textwrap.dedent(text))
+    return path
+
+
+def imported(path, folder, layout=LAYOUT, **options):
+    return import_telemetry(read_telemetry(path, layout, **options), layout, path, folder)
+
+
+def decoded(folder):
+    """Topic, log time and message, decoded by `rosbags` with the definitions in the file."""
+    with AnyReader([folder]) as reader:
+        return [
+            (connection.topic, stamp, reader.deserialize(data, connection.msgtype))
+            for connection, stamp, data in reader.messages()
+        ]
+
+
+def test_values_units_and_gaps_as_other_readers_see_them(tmp_path, doctor):
+    report = imported(table(tmp_path, TABLE), tmp_path / "bag")
+    doctor(tmp_path / "bag" / "bag_0.mcap")
+    seen = decoded(tmp_path / "bag")
+    for _, stamp, message in seen:
+        assert message.header.stamp.sec * 10**9 + message.header.stamp.nanosec == stamp
+
+    cells = [(stamp - EPOCH_NS, list(m.voltages)) for topic, stamp, m in seen if topic == "/css/voltages"]
+    assert [time for time, _ in cells] == [0, 100_000_000, 1_000_000_000]
+    np.testing.assert_array_equal([v for _, v in cells], [[0.5, 0.25], [math.nan, 0.5], [1.0, -0.01]])
+
+    imu = [message for topic, _, message in seen if topic == "/gyro/imu"]
+    degree = math.pi / 180
+    rates = [(m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z) for m in imu]
+    np.testing.assert_allclose(rates, np.array([(1, 2, -3), (0, 0, 0), (1, 2, 3), (0, 0, 0)]) * degree, rtol=1e-15)
+    assert [m.angular_velocity_covariance[0] for m in imu] == [0.0, -1.0, 0.0, 0.0]
+    assert all(m.orientation_covariance[0] == m.linear_acceleration_covariance[0] == -1.0 for m in imu)
+
+    truth = [message for topic, _, message in seen if topic == "/truth"]
+    np.testing.assert_allclose([m.sun_n for m in truth], [(0, 0, 1), (0, 0.6, 0.8), (1, 0, 0)], rtol=1e-15)
+    assert all(not np.any(m.sigma_bn) and m.illumination == m.solar_flux == 1.0 for m in truth)
+    assert {m.header.frame_id for m in truth} == {"eci"}
+    assert {m.header.frame_id for m in imu} == {"bus"}
+
+    assert report.messages == {"/truth": 3, "/css/voltages": 3, "/gyro/imu": 4}
+    assert (report.missing_cells, report.missing_lines, report.missing_rates, report.gaps) == (1, 1, 1, 1)
+    assert report.period_s == 0.1
+    assert report.largest_output == 1.0
+    assert report.ignored_columns == ("temperature",)
+
+
+def test_mission_inside_holds_the_layout_and_passes_the_checks_of_missions(tmp_path):
+    layout = LAYOUT._replace(field_of_view_deg=100.0, clip_normal_b=(0.0, 0.0, 1.0))
+    imported(table(tmp_path, TABLE), tmp_path / "bag", layout)
+    with BagReader(tmp_path / "bag") as reader:
+        text = reader.mission_text
+        assert reader.description["python"]
+    shared = flattened(read_sections(text, "recording")["/**"])
+    shared_table = tuple(parameter for section in SECTIONS.values() for parameter in section)
+    values = checked_values(shared_table, shared)
+    assert values["cells.normals"] == [1.0, 0.0, 0.0, 0.0, 0.6, 0.8]
+    assert values["cells.field_of_view_deg"] == 100.0
+    assert values["cells.clip_normal"] == [0.0, 0.0, 1.0]
+    assert values["mission.period"] == 0.1
+    assert values["mission.epoch"] == "2013-06-01T00:00:00Z"
+    assert values["mission.name"] == "table"
+
+
+def test_columns_that_are_not_there_make_no_topics(tmp_path):
+    report = imported(table(tmp_path, "time,c1,c2\n1370000000,1,2\n1370000000.5,3,4\n"), tmp_path / "bag")
+    assert report.messages == {"/css/voltages": 2}
+
+
+def test_seconds_count_exactly_from_the_epoch(tmp_path):
+    text = "time,c1,c2\n0.1,1,2\n0.30000000000000004,1,2\n123456.123456789,3,4\n"
+    rows = read_telemetry(table(tmp_path, text), LAYOUT, epoch_ns=EPOCH_NS).rows
+    assert [row.stamp_ns - EPOCH_NS for row in rows] == [100_000_000, 300_000_000, 123_456_123_456_789]
+
+
+def test_outputs_are_divided_by_full_scale(tmp_path):
+    path = table(tmp_path, "time,c1,c2\n1370000000,1.5,3\n")
+    assert read_telemetry(path, LAYOUT, full_scale=3.0).rows[0].cells == (0.5, 1.0)
+
+
+@pytest.mark.parametrize("unit", ["rad_s", "rad/s", "[rad/s]", "rad_per_s", "(rad/s)"])
+@pytest.mark.parametrize("name", ["omega", "gyro", "Rate", "omega_b"])
+def test_names_of_rate_columns(tmp_path, name, unit):
+    stem, *frame = name.split("_")
+    columns = ",".join("_".join([stem, axis, *frame, unit]) for axis in "XYz")
+    rows = read_telemetry(table(tmp_path, f"time,c1,c2,{columns}\n1370000000,1,1,1,2,3\n"), LAYOUT).rows
+    assert rows[0].omega_bn_b == (1.0, 2.0, 3.0)
+
+
+HEADER = "time,c1,c2,omega_x_rad_s,omega_y_rad_s,omega_z_rad_s,sun_x,sun_y,sun_z\n"
+GOOD = "1370000000,1,1,0,0,0,1,0,0\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "words", "kind"),
+    [
+        ("1370000001,1,1,0,0,0,1,0", "expected 9 fields, found 8", "wrong number of fields"),
+        ("1370000001,1,1,0,0,0,1,0,0,7", "expected 9 fields, found 10", "wrong number of fields"),
+        ("yesterday,1,1,0,0,0,1,0,0", "column time: 'yesterday' found, expected seconds or an instant", "no time"),
+        (",1,1,0,0,0,1,0,0", "column time: '' found", "no time"),
+        ("nan,1,1,0,0,0,1,0,0", "column time: 'nan' found", "no time"),
+        ("1e400,1,1,0,0,0,1,0,0", "column time: '1e400' found", "no time"),
+        ("9999999999,1,1,0,0,0,1,0,0", "outside of 1970 to 2038", "no time"),
+        ("12.5,1,1,0,0,0,1,0,0", "12.5 s is not a time since 1970; name the epoch", "no epoch"),
+        ("1370000000,1,1,0,0,0,1,0,0", "column time: 1370000000 is not after the line before", "does not go forward"),
+        ("1369999999,1,1,0,0,0,1,0,0", "is not after the line before", "does not go forward"),
+        ("1370000001,1,high,0,0,0,1,0,0", "column c2: 'high' found, expected a number", "no number"),
+        ('1370000001,1,"0,5",0,0,0,1,0,0', "column c2: '0,5' found, expected a number", "no number"),
+        ("1370000001,1,inf,0,0,0,1,0,0", "column c2: 'inf' found", "no number"),
+        ("1370000001,1,1,0,0,x,1,0,0", "column omega_z_rad_s: 'x' found", "no number"),
+        ("1370000001,1,1,0,0,0,0,0,0", "columns sun_x, sun_y, sun_z: expected a direction", "no direction"),
+    ],
+)
+def test_a_broken_line_is_named_or_left_out_and_counted(tmp_path, line, words, kind):
+    path = table(tmp_path, HEADER + GOOD + "\n" + line + "\n1370000002,1,1,0,0,0,1,0,0\n")
+    with pytest.raises(BagError) as refusal:
+        read_telemetry(path, LAYOUT)
+    assert str(refusal.value).startswith(f"{path}: line 4: ")
+    assert words in str(refusal.value)
+    telemetry = read_telemetry(path, LAYOUT, skip_bad=True)
+    assert len(telemetry.rows) == 2
+    ((found, count),) = telemetry.skipped.items()
+    assert kind in found and count == 1
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ("t,c1,c2", "no column time; the header is t, c1, c2"),
+        ("time,c1", "no column c2, which the cell layout names"),
+        ("time,c1,c2,c1", "two columns are called c1"),
+        ("time,c1,c2,omega_x,omega_y,omega_z", "column omega_x: expected its unit"),
+        ("time,c1,c2,omega_x_rad_s", "no column omega_y"),
+        ("time,c1,c2,omega_x_rad_s,omega_y_deg_s,omega_z_rad_s", "different units"),
+        ("time,c1,c2,sun_x,sun_y", "no column sun_z"),
+        ("", "no column time; the header is empty"),
+    ],
+)
+def test_a_header_without_what_is_needed_is_refused(tmp_path, header, words):
+    with pytest.raises(BagError, match="line 1") as refusal:
+        read_telemetry(table(tmp_path, header + "\n"), LAYOUT)
+    assert words in str(refusal.value)
+
+
+def test_tables_without_telemetry_are_refused(tmp_path):
+    with pytest.raises(BagError, match="no line of telemetry"):
+        read_telemetry(table(tmp_path, HEADER), LAYOUT)
+    with pytest.raises(BagError, match="every cell output is missing"):
+        imported(table(tmp_path, "time,c1,c2\n1370000000,,\n"), tmp_path / "bag")
+    with pytest.raises(BagError, match="cannot be read"):
+        read_telemetry(tmp_path / "nowhere.csv", LAYOUT)
+    (tmp_path / "binary.csv").write_bytes(bytes(range(256)))
+    with pytest.raises(BagError, match="cannot be read"):
+        read_telemetry(tmp_path / "binary.csv", LAYOUT)
+
+
+numbers = st.floats(-1e6, 1e6) | st.just(math.nan)
+vectors = st.none() | st.tuples(*[st.floats(-10, 10)] * 3)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.lists(st.tuples(st.integers(1, 10**10), numbers, numbers, vectors), min_size=1, max_size=8),
+    st.sampled_from(",;\t"),
+)
+def test_any_table_comes_out_as_it_went_in(tmp_path_factory, lines, delimiter):
+    tmp_path = tmp_path_factory.mktemp("any")
+    path = tmp_path / "table.csv"
+    stamp_ns, expected, text = EPOCH_NS, [], [delimiter.join(HEADER.strip().split(",")[:6])]
+    for step_ns, c1, c2, rate in lines:
+        stamp_ns += step_ns
+        expected.append((stamp_ns, (c1, c2), rate))
+        time = f"{stamp_ns // 10**9}.{stamp_ns % 10**9:09d}"
+        fields = [time, *("" if math.isnan(c) else repr(c) for c in (c1, c2)), *map(repr, rate or ("", "", ""))]
+        text.append(delimiter.join(field if field != "''" else "" for field in fields))
+    path.write_text("\n".join(text) + "\n")
+    if all(math.isnan(c) for _, cells, _ in expected for c in cells):
+        with pytest.raises(BagError, match="every cell output is missing"):
+            imported(path, tmp_path / "bag")
+        return
+    imported(path, tmp_path / "bag")
+    seen = decoded(tmp_path / "bag")
+    cells = {stamp: tuple(message.voltages) for topic, stamp, message in seen if topic == "/css/voltages"}
+    wanted = {stamp: pair for stamp, pair, _ in expected if not all(map(math.isnan, pair))}
+    assert cells.keys() == wanted.keys()
+    for stamp, pair in wanted.items():
+        np.testing.assert_array_equal(cells[stamp], pair)
+    rates = [
+        (m.angular_velocity.x, m.angular_velocity.y, m.angular_velocity.z)
+        if m.angular_velocity_covariance[0] != -1.0
+        else None
+        for topic, _, m in seen
+        if topic == "/gyro/imu"
+    ]
+    assert rates == [rate for _, _, rate in expected]
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.text(max_size=200) | st.text("time,c1c2;\n\t0123456789.-\"'#", max_size=200), st.booleans())
+def test_no_text_makes_the_reader_crash(tmp_path_factory, text, skip_bad):
+    path = tmp_path_factory.mktemp("garbage") / "table.csv"
+    path.write_text("time,c1,c2\n1370000000,1,1\n" + text, encoding="utf-8", errors="replace", newline="")
+    try:
+        telemetry = read_telemetry(path, LAYOUT, skip_bad=skip_bad)
+    except BagError as error:
+        assert str(path) in str(error)
+    else:
+        stamps = [row.stamp_ns for row in telemetry.rows]
+        assert stamps == sorted(set(stamps))
+
+
+def layout(tmp_path, text, name="layout.yaml"):
+    path = tmp_path / name
+    path.write_text(textwrap.dedent(text))
+    return path
+
+
+def test_layouts_in_both_forms(tmp_path):
+    text = """\
+        cells: {CSS 1: [0.71, 0, 0.71], 2: [0, 0, -1]}
+        field_of_view_deg: 100
+        clip_normal: [0, 0, 1]
+    """
+    found = read_layout(layout(tmp_path, text))
+    assert found.names == ("CSS 1", "2")
+    np.testing.assert_allclose(found.normals_b, [(0.5**0.5, 0, 0.5**0.5), (0, 0, -1)], rtol=1e-15)
+    assert found.field_of_view_deg == 100.0
+    assert found.clip_normal_b == (0.0, 0.0, 1.0)
+    found = read_layout(layout(tmp_path, "cell,x,y,z\nA, 1, 0, 0\nB,0,0,-1\n", "layout.csv"))
+    assert found == CellLayout(("A", "B"), ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "expected the key cells"),
+        ("[1, 2]", "expected the key cells"),
+        ("cells: 3", "expected the key cells"),
+        ("cells: {}", "0 cells given"),
+        ("cells: {a: [1, 0]}", "cell a: .* expected a unit vector"),
+        ("cells: {a: [1, 1, 0]}", "cell a: a normal of length 1.414"),
+        ("cells: {a: [1, 0, x]}", "cell a: 'x' given, expected a number"),
+        ("cells: {a: [1, 0, true]}", "cell a: True given"),
+        ("cells: {a: [.nan, 0, 1]}", "cell a: nan given"),
+        ("cells: {a: north}", "cell a: 'north' given"),
+        ("cells: {a: [1, 0, 0]}\nfov: 3", "unknown key fov"),
+        ("cells: {a: [1, 0, 0]}\nfield_of_view_deg: 200", "expected 1 to 180"),
+        ("cells: {a: [1, 0, 0]}\nclip_normal: 3", "clip_normal: 3 given"),
+        ("cells: [", "not valid YAML"),
+        ("cells: {" + ", ".join(f"c{i}: [1, 0, 0]" for i in range(33)) + "}", "33 cells given, expected 1 to 32"),
+    ],
+)
+def test_broken_layouts_are_refused(tmp_path, text, words):
+    with pytest.raises(BagError, match=words):
+        read_layout(layout(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "expected the header"),
+        ("name,x,y,z\n", "expected the header cell,x,y,z"),
+        ("cell,x,y,z\na,1,0\n", "cell a: expected a name and three numbers"),
+        ("cell,x,y,z\na,1,0,0\na,1,0,0\n", "cell a stands twice"),
+    ],
+)
+def test_broken_layout_tables_are_refused(tmp_path, text, words):
+    with pytest.raises(BagError, match=words):
+        read_layout(layout(tmp_path, text, "layout.csv"))
+
+
+def test_command(tmp_path, capsys):
+    cells = str(layout(tmp_path, "cells: {c1: [1, 0, 0], c2: [0, 0.6, 0.8]}"))
+    flight = str(table(tmp_path, "time,c1,c2,mode\n0,2,1,a\n1,oops,1,b\n2,1,,c\n"))
+    bag = str(tmp_path / "bag")
+    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01"]) == 1
+    assert "line 3: column c1: 'oops' found" in capsys.readouterr().err
+    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01", "--skip-bad"]) == 0
+    printed = capsys.readouterr().out
+    for words in (
+        "2 messages, every 2 s",
+        "missing cell outputs: 1",
+        "broken lines left out (no number): 1",
+        "columns not used: mode",
+        "--full-scale",
+    ):
+        assert words in printed
+    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01", "--skip-bad"]) == 1
+    assert "not empty" in capsys.readouterr().err
+    for wrong in (["--epoch", "soon"], ["--full-scale", "0"], ["--nonsense"]):
+        with pytest.raises(SystemExit) as exit_info:
+            main([flight, cells, *wrong])
+        assert exit_info.value.code == 2
