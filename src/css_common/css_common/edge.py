@@ -12,7 +12,12 @@ from css_common.component import INERTIAL, Component, Input
 from css_common.schema import Values
 
 Report = Callable[[str], None]
+HISTORY = 10
+"""Messages that a subscription holds for a node. One that was restarted answers these again."""
+
 _CONFIRMATIONS = 3
+_MOST_PENDING = 64
+_NEVER = -(2**63)
 
 
 class StampGuard:
@@ -20,7 +25,8 @@ class StampGuard:
 
     A stamp that repeats or goes back is refused, and so is one far ahead: a single damaged stamp must not lock
     out all that follow. When several messages in a row agree on a new time, the sender's clock really was set, or
-    a recording started over, and the guard follows.
+    a recording started over, and the guard follows; back in time only when there are more than a restarted sender
+    may repeat.
     """
 
     def __init__(self, largest_gap_ns: int) -> None:
@@ -44,7 +50,7 @@ class StampGuard:
         else:
             self._agreeing = 1
         self._candidate = stamp_ns
-        if self._agreeing > _CONFIRMATIONS:
+        if self._agreeing > (_CONFIRMATIONS if stamp_ns > last else HISTORY):
             self.last = stamp_ns
             self._candidate = None
             return None
@@ -70,7 +76,9 @@ class Edge:
         expected = io.inertial_frame if source.frame == INERTIAL else io.body_frame
         self.frames = frozenset((expected, *io.accepted_frames))
         self.expected_frame = expected
-        self.guard = StampGuard(round(io.largest_gap * 1e9))
+        # a message that is due less often than that must not count as one from another time
+        largest_gap = max(io.largest_gap, 2.0 * values.mission.period * source.divider)
+        self.guard = StampGuard(round(largest_gap * 1e9))
         self._finite_fields = self.codec.real_fields(source.used)
         self._report = report
 
@@ -107,13 +115,18 @@ class Edge:
 
 
 class Matcher:
-    """Brings the inputs of one cycle together by their stamps."""
+    """Brings the inputs of one cycle together by their stamps.
+
+    Attributes:
+        unmatched: messages that no cycle used.
+        set_back: how often time went back and the component began anew.
+    """
 
     def __init__(self, component: Component, inputs: Iterable[Input], awaited: Iterable[str]) -> None:
         """Prepares the matching.
 
         Args:
-            component: whose steps decide which inputs are due.
+            component: whose steps decide which inputs are due, and which begins anew when time goes back.
             inputs: all inputs; the first one paces the cycle when matching by the latest.
             awaited: keys without which an exact cycle does not run (required ones, and optional ones that
                 have a publisher).
@@ -123,37 +136,52 @@ class Matcher:
         self.exact = component.values.io.input_matching == "exact"
         self.deadline_ns = round(component.values.io.deadline * 1e9)
         self.unmatched = 0
+        self.set_back = 0
         self._pacing = next(iter(self.inputs), None)
         self._component = component
         self._divided = any(i.divider > 1 for i in self.inputs.values())
+        self._speaking = self.awaited  # without optional inputs that let a deadline pass
         self._pending: dict[int, dict[str, Sample]] = {}
         self._latest: dict[str, Sample] = {}
-        self._done = -1
+        self._newest: dict[str, int] = {}
+        self._done = _NEVER
 
     def offer(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         """Takes a message; returns the cycles that are now complete, oldest first."""
         if not self.exact:
             return self._offer_latest(key, sample)
         stamp = sample.stamp_ns
+        went_back = stamp < self._newest.get(key, _NEVER)
+        self._newest[key] = stamp
+        if key in self.awaited and key not in self._speaking:
+            self._speaking |= {key}
         if stamp <= self._done:
-            if self._done - stamp < self.deadline_ns:
-                self.unmatched += 1  # its cycle has run without it
+            # The edge lets a sender's stamps go back only when its clock was set back. Stamps behind those of the
+            # others are late, or come from a clock that never agreed with theirs: neither may stop the cycle.
+            if not went_back or self._done - stamp < self.deadline_ns:
+                self.unmatched += 1
                 return []
-            self.restart()  # the edge lets stamps far back pass only when the sender's clock was set back
+            self._begin_anew()
         slots = self._pending.setdefault(stamp, {})
         slots[key] = sample
-        if len(slots) < self._due(stamp):
-            if len(self._pending) > 64:
-                self.unmatched += len(self._pending.pop(min(self._pending)))
+        if not slots.keys() >= self._due(stamp):
+            if len(self._pending) > _MOST_PENDING:
+                # the one that waits longest; by stamp, leftovers of a time ahead would push out every new one
+                self.unmatched += len(self._pending.pop(next(iter(self._pending))))
             return []
         return [self._complete(stamp)]
 
     def overdue(self) -> list[tuple[int, dict[str, Sample | None]]]:
-        """Cycles that have all required inputs and wait for optional ones alone, oldest first; called at a deadline."""
+        """Cycles that wait for optional inputs alone, oldest first; called at a deadline.
+
+        What is silent now is not waited for again until it speaks: a dead gyro costs one deadline, not one a cycle.
+        """
         ready = []
         for stamp in sorted(self._pending):
             slots = self._pending.get(stamp)
-            if slots is not None and all(k in slots for k, i in self.inputs.items() if i.required):
+            missing = self._due(stamp) - slots.keys() if slots is not None else frozenset()
+            if slots is not None and not any(self.inputs[key].required for key in missing):
+                self._speaking -= missing
                 ready.append(self._complete(stamp))
         return ready
 
@@ -162,23 +190,25 @@ class Matcher:
         return min(self._pending, default=None)
 
     def missing(self) -> list[str]:
-        """Topics that the oldest incomplete cycle still waits for."""
+        """Topics that the oldest incomplete cycle still waits for; of all cycles when there is none."""
         if not self._pending:
             return [i.topic for i in self.inputs.values() if i.key in self.awaited]
-        slots = self._pending[min(self._pending)]
-        return [i.topic for k, i in self.inputs.items() if k in self.awaited and k not in slots]
+        oldest = min(self._pending)
+        missing = self._due(oldest) - self._pending[oldest].keys()
+        return [i.topic for i in self.inputs.values() if i.key in missing]
 
-    def restart(self) -> None:
-        """Forgets what was received."""
+    def _begin_anew(self) -> None:
         self._pending.clear()
         self._latest.clear()
-        self._done = -1
+        self._done = _NEVER
+        self.set_back += 1
+        self._component.configure()
 
-    def _due(self, stamp: int) -> int:
+    def _due(self, stamp: int) -> frozenset[str]:
         if not self._divided:
-            return len(self.awaited)
+            return self._speaking
         step = self._component.step_of(stamp)
-        return sum(step % self.inputs[key].divider == 0 for key in self.awaited)
+        return frozenset(key for key in self._speaking if step % self.inputs[key].divider == 0)
 
     def _complete(self, stamp: int) -> tuple[int, dict[str, Sample | None]]:
         slots = self._pending.pop(stamp)
@@ -192,6 +222,9 @@ class Matcher:
         if key != self._pacing:
             return []
         stamp = sample.stamp_ns
+        if stamp <= self._done:  # as the edge found, the clock was set back
+            self._begin_anew()
+            self._latest[key] = sample
         received = {}
         for name, entry in self.inputs.items():
             held = self._latest.get(name)
@@ -200,4 +233,5 @@ class Matcher:
                 self.unmatched += 1
                 return []
             received[name] = held if fresh else None
+        self._done = stamp
         return [(stamp, received)]

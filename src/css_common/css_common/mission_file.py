@@ -11,6 +11,9 @@ import yaml
 class MissionError(Exception):
     """A mission that cannot be flown: one line that names file, key, value and what was expected."""
 
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.splitlines()))
+
 
 class _Loader(yaml.SafeLoader):
     """Reads plain words as ROS does, and refuses what ROS refuses or would take without a word.

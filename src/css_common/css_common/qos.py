@@ -3,6 +3,8 @@
 
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
+from css_common.edge import HISTORY
+
 LOOP_PUBLISHER = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=100,
@@ -13,7 +15,7 @@ LOOP_PUBLISHER = QoSProfile(
 
 LOOP_SUBSCRIPTION = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
-    depth=10,
+    depth=HISTORY,
     reliability=ReliabilityPolicy.RELIABLE,
     durability=DurabilityPolicy.TRANSIENT_LOCAL,
 )

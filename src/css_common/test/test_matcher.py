@@ -1,0 +1,339 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Matching of inputs by their stamps: complete cycles only, in order, whatever the order of arrival."""
+
+import itertools
+from collections.abc import Iterable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from css_common.codec import Sample
+from css_common.component import Component, Input
+from css_common.edge import HISTORY, Matcher, StampGuard
+from css_common.schema import default_values
+from css_common.sections import IO, MISSION
+from css_msgs.msg import CssVoltages
+
+SECOND = 1_000_000_000
+STEP = SECOND // 10
+VALUES = default_values(MISSION + IO)
+T0 = 1_370_044_800 * SECOND
+
+
+class Begun(Component):
+    """Counts how often it began anew."""
+
+    begun = 0
+
+    def configure(self) -> None:
+        """Begins."""
+        self.begun += 1
+
+
+def entry(key: str, *, required: bool = True, divider: int = 1) -> Input:
+    """An input called `key`."""
+    return Input(key, f"topic/{key}", CssVoltages, required=required, divider=divider)
+
+
+def matcher_of(inputs: Iterable[Input], awaited: Iterable[str] | None = None, **changes) -> Matcher:
+    """A matcher of some inputs; without `awaited` all of them are."""
+    inputs = tuple(inputs)
+    component = Begun("begun", default_values(MISSION + IO, **changes))
+    return Matcher(component, inputs, [i.key for i in inputs] if awaited is None else awaited)
+
+
+def at(step: float) -> Sample:
+    """A message of a step."""
+    return Sample(T0 + round(step * STEP), "bus")
+
+
+def offered(matcher: Matcher, *messages: tuple[str, float]) -> list[tuple[float, str]]:
+    """Steps of the cycles that some messages complete, with the keys that were there."""
+    cycles = []
+    for key, step in messages:
+        for stamp, received in matcher.offer(key, at(step)):
+            present = {k: s for k, s in received.items() if s is not None}
+            if matcher.exact:
+                assert all(sample.stamp_ns == stamp for sample in present.values())
+            assert received.keys() == matcher.inputs.keys()
+            cycles.append(((stamp - T0) / STEP, "".join(sorted(present))))
+    return cycles
+
+
+AB = (entry("a"), entry("b"))
+
+
+@pytest.mark.parametrize("order", list(itertools.permutations("abc")))
+def test_cycle_is_complete_with_the_last_input_in_any_order(order):
+    matcher = matcher_of((*AB, entry("c")))
+    assert offered(matcher, *[(key, 0) for key in order[:2]]) == []
+    assert offered(matcher, (order[2], 0)) == [(0, "abc")]
+    assert matcher.unmatched == 0
+
+
+def test_inputs_that_run_ahead_of_each_other_are_matched_by_stamp():
+    matcher = matcher_of(AB)
+    assert offered(matcher, ("a", 0), ("a", 1), ("a", 2), ("b", 0), ("b", 1), ("b", 2)) == [
+        (0, "ab"), (1, "ab"), (2, "ab"),
+    ]  # fmt: skip
+    assert matcher.unmatched == 0
+
+
+def test_step_that_lost_an_input_is_left_behind_by_the_next():
+    matcher = matcher_of(AB)
+    assert offered(matcher, ("a", 0), ("a", 1), ("b", 1), ("b", 0)) == [(1, "ab")]
+    assert matcher.unmatched == 2
+
+
+def test_one_input_alone_is_never_a_cycle_of_two():
+    matcher = matcher_of(AB)
+    assert offered(matcher, *[("a", k) for k in range(200)]) == []
+
+
+def test_an_input_that_nobody_awaited_does_not_stand_for_one_that_is():
+    # c has no publisher in the mission, yet somebody publishes it
+    matcher = matcher_of((*AB, entry("c", required=False)), awaited=("a", "b"))
+    assert offered(matcher, ("a", 0), ("c", 0)) == []
+    assert offered(matcher, ("b", 0)) == [(0, "abc")]
+    assert offered(matcher, ("a", 1), ("b", 1), ("c", 1)) == [(1, "ab")]
+    assert matcher.unmatched == 1
+
+
+def test_repeated_messages_of_one_input_do_not_complete_a_cycle():
+    matcher = matcher_of(AB)
+    assert offered(matcher, ("a", 0), ("a", 0), ("a", 0)) == []
+    assert offered(matcher, ("b", 0)) == [(0, "ab")]
+
+
+def test_dividers():
+    matcher = matcher_of((entry("a"), entry("m", divider=4)))
+    assert offered(matcher, ("a", 0)) == []
+    assert offered(matcher, ("m", 0)) == [(0, "am")]
+    assert offered(matcher, ("a", 1), ("a", 2), ("a", 3)) == [(1, "a"), (2, "a"), (3, "a")]
+    assert offered(matcher, ("m", 4), ("a", 4)) == [(4, "am")]
+
+
+def test_a_message_that_is_not_due_does_not_stand_for_one_that_is():
+    matcher = matcher_of((*AB, entry("m", divider=4)))
+    assert offered(matcher, ("a", 1), ("m", 1)) == []
+    assert offered(matcher, ("b", 1)) == [(1, "abm")]
+
+
+def test_cycle_without_anything_due_runs_on_what_comes():
+    matcher = matcher_of((entry("m", divider=4),))
+    assert offered(matcher, ("m", 0), ("m", 1), ("m", 4)) == [(0, "m"), (1, "m"), (4, "m")]
+
+
+def test_optional_input_with_a_publisher_is_waited_for():
+    matcher = matcher_of((entry("a"), entry("g", required=False)))
+    assert offered(matcher, ("a", 0)) == []
+    assert offered(matcher, ("g", 0)) == [(0, "ag")]
+
+
+def overdue(matcher: Matcher) -> list[tuple[float, str]]:
+    """Steps of the cycles that run at a deadline, with the keys that were there."""
+    return [
+        ((stamp - T0) / STEP, "".join(k for k, s in received.items() if s is not None))
+        for stamp, received in matcher.overdue()
+    ]
+
+
+def test_at_the_deadline_a_cycle_runs_without_its_optional_inputs():
+    matcher = matcher_of((entry("a"), entry("g", required=False)))
+    assert offered(matcher, ("a", 0), ("a", 1)) == []
+    assert matcher.oldest_pending() == T0
+    assert matcher.missing() == ["topic/g"]
+    assert overdue(matcher) == [(0, "a"), (1, "a")]
+    assert matcher.oldest_pending() is None
+
+
+def test_dead_optional_input_costs_one_deadline_and_is_awaited_again_when_it_speaks():
+    matcher = matcher_of((entry("a"), entry("g", required=False)))
+    offered(matcher, ("a", 0))
+    overdue(matcher)
+    assert offered(matcher, ("a", 1), ("a", 2)) == [(1, "a"), (2, "a")]
+    assert offered(matcher, ("g", 2)) == []
+    assert matcher.unmatched == 1
+    assert offered(matcher, ("a", 3)) == []
+    assert offered(matcher, ("g", 3)) == [(3, "ag")]
+
+
+def test_required_inputs_are_waited_for_beyond_any_deadline():
+    matcher = matcher_of((*AB, entry("g", required=False)))
+    offered(matcher, ("a", 0), ("g", 0))
+    assert overdue(matcher) == []
+    assert matcher.missing() == ["topic/b"]
+    assert offered(matcher, ("b", 0)) == [(0, "abg")]
+
+
+def test_at_the_deadline_required_inputs_that_are_not_due_are_not_missed():
+    matcher = matcher_of((entry("a"), entry("m", divider=4), entry("g", required=False)))
+    offered(matcher, ("a", 1))
+    assert overdue(matcher) == [(1, "a")]
+
+
+def test_what_is_missing_before_anything_came():
+    matcher = matcher_of((*AB, entry("g", required=False)), awaited=("a", "b"))
+    assert matcher.missing() == ["topic/a", "topic/b"]
+    assert matcher.oldest_pending() is None
+
+
+def test_late_messages_are_counted_and_change_nothing():
+    matcher = matcher_of(AB)
+    offered(matcher, ("a", 5), ("b", 5))
+    assert offered(matcher, ("a", 4), ("b", 4), ("b", 5)) == []
+    assert matcher.unmatched == 3
+    assert offered(matcher, ("a", 6), ("b", 6)) == [(6, "ab")]
+
+
+def test_memory_is_bounded_and_newest_steps_are_kept():
+    matcher = matcher_of(AB)
+    offered(matcher, *[("a", k) for k in range(1000)])
+    assert len(matcher._pending) <= 64
+    assert matcher.unmatched >= 936
+    assert offered(matcher, ("b", 999)) == [(999, "ab")]
+
+
+def test_time_set_back_begins_anew_and_cycles_again():
+    matcher = matcher_of(AB)
+    assert offered(matcher, *[(key, 1000 + k) for k in range(3) for key in "ab"])[-1] == (1002, "ab")
+    begun = matcher._component.begun
+    # the recording starts over; one input is there first, the other still speaks of the old time
+    assert offered(matcher, ("a", 0), ("b", 1003), ("a", 1), ("b", 1)) == [(1, "ab")]
+    assert matcher.set_back == 1
+    assert matcher._component.begun == begun + 1
+    assert offered(matcher, ("b", 2), ("a", 2)) == [(2, "ab")]
+    assert matcher.set_back == 1
+
+
+def test_leftovers_of_a_time_ahead_do_not_push_out_what_comes_now():
+    # b never spoke: a's steps are pending when the recording starts over, this time with b
+    matcher = matcher_of(AB)
+    offered(matcher, *[("a", 1000 + k) for k in range(200)])
+    assert offered(matcher, ("a", 0), ("b", 0), ("a", 1), ("b", 1)) == [(0, "ab"), (1, "ab")]
+
+
+def test_input_whose_clock_never_agreed_does_not_stop_the_others():
+    matcher = matcher_of((*AB, entry("g", required=False)), awaited=("a", "b"))
+    cycles = offered(matcher, *[m for k in range(50) for m in (("a", 1000 + k), ("g", k), ("b", 1000 + k))])
+    assert cycles == [(1000 + k, "ab") for k in range(50)]
+    assert matcher.set_back == 0
+
+
+def test_restarted_sender_that_answers_its_history_again_does_not_stop_the_cycle():
+    # behind the edge as in a node: the sender of b died in step 100, a waits there, b repeats what it had held
+    matcher, guard = matcher_of(AB), StampGuard(60 * SECOND)
+
+    def arrive(step: int) -> list:
+        return offered(matcher, ("b", step)) if guard.refusal(at(step).stamp_ns) is None else []
+
+    for k in range(100):
+        offered(matcher, ("a", k))
+        assert arrive(k) == [(k, "ab")]
+    offered(matcher, ("a", 100))
+    again = [cycle for k in range(101 - HISTORY, 101) for cycle in arrive(k)]
+    assert again == [(100, "ab")]
+    assert matcher.set_back == 0
+
+
+LATEST = {"io__input_matching": "latest", "io__deadline": 0.5}
+
+
+def test_latest_takes_the_newest_of_each_when_the_first_speaks():
+    matcher = matcher_of(AB, **LATEST)
+    assert offered(matcher, ("b", 0.3), ("b", 0.7)) == []
+    assert offered(matcher, ("a", 1)) == [(1, "ab")]
+    assert matcher._latest["b"].stamp_ns == at(0.7).stamp_ns
+    assert offered(matcher, ("a", 2), ("b", 2.1), ("a", 3)) == [(2, "ab"), (3, "ab")]
+
+
+def test_latest_does_not_cycle_on_stale_required_inputs():
+    matcher = matcher_of(AB, **LATEST)
+    offered(matcher, ("b", 0))
+    assert offered(matcher, ("a", 5)) == [(5, "ab")]
+    assert offered(matcher, ("a", 5.1)) == []
+    assert matcher.unmatched == 1
+    assert offered(matcher, ("b", 5.2), ("a", 6)) == [(6, "ab")]
+
+
+def test_latest_gives_none_for_stale_optional_inputs():
+    matcher = matcher_of((entry("a"), entry("g", required=False)), **LATEST)
+    assert offered(matcher, ("a", 0), ("g", 0.5), ("a", 1), ("a", 7)) == [(0, "a"), (1, "ag"), (7, "a")]
+
+
+def test_latest_takes_inputs_that_are_a_little_ahead():
+    matcher = matcher_of(AB, **LATEST)
+    assert offered(matcher, ("b", 4), ("a", 0)) == [(0, "ab")]
+    matcher = matcher_of(AB, **LATEST)
+    assert offered(matcher, ("b", 6), ("a", 0)) == []
+
+
+def test_latest_begins_anew_when_time_was_set_back():
+    matcher = matcher_of(AB, **LATEST)
+    assert offered(matcher, ("b", 1000), ("a", 1000), ("a", 0)) == [(1000, "ab")]
+    assert matcher.set_back == 1
+    assert offered(matcher, ("b", 0.5), ("a", 1)) == [(1, "ab")]
+
+
+arrivals = st.lists(
+    st.tuples(
+        st.sampled_from("abgm"),
+        st.one_of(st.integers(0, 12), st.integers(-(10**9), 10**9), st.floats(0, 12), st.just(None)),
+    ),
+    max_size=120,
+)
+INPUTS = (entry("a"), entry("b"), entry("g", required=False), entry("m", required=False, divider=4))
+
+
+@pytest.mark.parametrize("matching", ["exact", "latest"])
+@given(arrivals=arrivals, awaited=st.sets(st.sampled_from("gm")))
+def test_any_sequence_gives_cycles_in_order_with_all_that_is_required(matching, arrivals, awaited):
+    matcher = matcher_of(INPUTS, awaited={"a", "b"} | awaited, io__input_matching=matching)
+    guards = {key: StampGuard(60 * SECOND) for key in "abgm"}
+    last, timeline, taken = None, 0, 0
+    for key, step in arrivals:
+        if step is None:
+            cycles = matcher.overdue()
+        elif guards[key].refusal(at(step).stamp_ns) is not None:
+            continue
+        else:
+            taken += 1
+            cycles = matcher.offer(key, at(step))
+        for stamp, received in cycles:
+            if matcher.set_back != timeline:
+                last, timeline = None, matcher.set_back
+            assert last is None or stamp > last
+            last = stamp
+            for name, source in matcher.inputs.items():
+                sample = received[name]
+                if source.required:
+                    assert sample is not None
+                if sample is not None and matching == "exact":
+                    assert sample.stamp_ns == stamp
+                elif sample is not None:
+                    assert abs(sample.stamp_ns - stamp) <= matcher.deadline_ns
+        assert len(matcher._pending) <= 64
+        assert 0 <= matcher.unmatched <= taken
+
+
+@given(st.permutations("aaaaaaaabbbbbbbb"))
+def test_steps_whose_inputs_both_come_in_order_are_never_lost(order):
+    # however the two senders interleave
+    matcher = matcher_of(AB)
+    messages = [(key, order[:i].count(key)) for i, key in enumerate(order)]
+    assert offered(matcher, *messages) == [(k, "ab") for k in range(8)]
+    assert matcher.unmatched == 0
+
+
+@given(st.integers(0, 10**6), st.floats(-0.4, 0.4))
+def test_number_of_a_step_is_that_of_the_nearest_cycle(step, off):
+    component = Begun("begun", VALUES)
+    assert component.step_of(component.epoch_ns + step * STEP + round(off * STEP)) == step
+
+
+def test_samples_keep_what_they_were_given():
+    sample = Sample(3, "bus", voltages=np.zeros(2))
+    assert "voltages" in repr(sample)
+    assert (sample.stamp_ns, sample.frame_id) == (3, "bus")
