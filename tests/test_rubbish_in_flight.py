@@ -29,7 +29,7 @@ def _rubbish(mission, stamp_ns: int) -> dict[str, tuple[type, list[bytes]]]:
                 voltages.encode(voltages.sample(ahead, "bus", voltages=nan)),
                 voltages.encode(voltages.sample(ahead, "bus", voltages=good * np.inf)),
                 voltages.encode(voltages.sample(stamp_ns - 10 * mission.period_ns, "bus", voltages=good)),
-                voltages.encode(voltages.sample(stamp_ns + 10**18, "bus", voltages=good)),
+                voltages.encode(voltages.sample(stamp_ns + 10**17, "bus", voltages=good)),
                 voltages.encode(voltages.sample(ahead, "camera", voltages=good)),
                 b"\x00\x01\x00\x00" + os.urandom(40),
                 b"\x00\x01\x00\x00" + struct.pack("<iII", 1, 2, 0xFFFFFFF0),
@@ -69,7 +69,6 @@ def test_flight_with_rubbish_is_the_flight_without(tmp_path, rounds):
                         publishers[topic].publish(data)
 
         flight.executor.add_node(vandal)
-        # a second publisher on a loop topic must not be there before the flight begins
         result = flight.fly(disturb)
         assert result.failure == ""
         ekf = flight.nodes["ekf"].edges["voltages"].rejected

@@ -32,9 +32,8 @@ class SunEstimator(Component):
                 "css/voltages",
                 CssVoltages,
                 lengths={"voltages": len(values.cells.normals)},
-                used=("saturated",),  # a cell that reads NaN is one dark cell, not a lost message
             ),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity_covariance",)),
+            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
         )
 
     @classmethod
