@@ -20,6 +20,7 @@ PARAMETERS: Table = (
     flag("disturbances.gravity_gradient", False, "torque of the Earth's gravity gradient"),
     flag("disturbances.aerodynamic", False, "torque of drag on the panels"),
     flag("disturbances.solar_pressure", False, "torque of sunlight on the panels"),
+    real("disturbances.air_density", 3e-12, "kg/m^3", "density of the air along the orbit", low=0.0, high=1.0),
     reals("disturbances.dipole", (0.0, 0.0, 0.0), "A m^2", "residual magnetic dipole of the spacecraft", length=3),
     reals("panels.areas", (), "m^2", "area of each flat panel; a plate with two sides is two panels", low=0.0),
     reals("panels.normals", (), "-", "outward unit normals of the panels in b, a row each", columns=3),
@@ -42,6 +43,7 @@ class Disturbances(NamedTuple):
     gravity_gradient: bool
     aerodynamic: bool
     solar_pressure: bool
+    air_density: float  # [kg/m^3]
     dipole_b: Vec3  # [A m^2]
     drag_coefficient: float
     specular: float
@@ -60,6 +62,7 @@ def parameters(values: Values) -> Disturbances:
         gravity_gradient=values.disturbances.gravity_gradient,
         aerodynamic=values.disturbances.aerodynamic,
         solar_pressure=values.disturbances.solar_pressure,
+        air_density=values.disturbances.air_density,
         dipole_b=(x, y, z),
         drag_coefficient=values.panels.drag_coefficient,
         specular=values.panels.specular,
@@ -132,23 +135,20 @@ def solar_pressure_torque(panels, specular: float, diffuse: float, sun_b: Vec3, 
 
 
 @kernel
-def disturbance_torque(
-    p: Disturbances, inertia: Mat3, dcm_bn: Mat3, environment: EnvironmentState, density: float
-) -> Vec3:
+def disturbance_torque(p: Disturbances, inertia: Mat3, dcm_bn: Mat3, environment: EnvironmentState) -> Vec3:
     """Sum of the torques that `p` asks for [N m], in b.
 
     Args:
         inertia: of the whole spacecraft [kg m^2].
         dcm_bn: attitude.
         environment: what surrounds the spacecraft.
-        density: of the air [kg/m^3].
     """
     torque = (0.0, 0.0, 0.0)
     if p.gravity_gradient:
         torque = add(torque, gravity_gradient_torque(inertia, multiply(dcm_bn, environment.r_n)))
-    if p.aerodynamic and density > 0.0:
+    if p.aerodynamic:
         velocity_b = multiply(dcm_bn, air_velocity(environment.r_n, environment.v_n))
-        torque = add(torque, aerodynamic_torque(p.panels, p.drag_coefficient, velocity_b, density))
+        torque = add(torque, aerodynamic_torque(p.panels, p.drag_coefficient, velocity_b, p.air_density))
     if p.solar_pressure and environment.illumination > 0.0:
         pressure = SOLAR_PRESSURE * environment.solar_flux * environment.illumination
         sun_b = multiply(dcm_bn, environment.sun_n)

@@ -66,7 +66,6 @@ def advance(
     wheel_command,
     rod_command,
     environment: EnvironmentState,
-    density: float,
     dt: float,
     wheel_torque_out,
 ):
@@ -79,7 +78,6 @@ def advance(
         wheel_command: (N,) motor torques [N m].
         rod_command: (M,) dipoles [A m^2]; M is 0 without rods.
         environment: at the start of the cycle.
-        density: of the air [kg/m^3].
         dt: length of the cycle [s].
         wheel_torque_out: (N,) motor torques applied [N m], written.
 
@@ -90,7 +88,7 @@ def advance(
     if p.disturbed or p.rod_axes_b.shape[0] > 0:
         dcm_bn = mrp_to_dcm(state.sigma_bn)
         if p.disturbed:
-            torque_b = disturbance_torque(p.disturbances, p.body.inertia, dcm_bn, environment, density)
+            torque_b = disturbance_torque(p.disturbances, p.body.inertia, dcm_bn, environment)
         if p.rod_axes_b.shape[0] > 0:
             field_b = multiply(dcm_bn, environment.field_n)
             torque_b = add(torque_b, cross(rod_dipole(p.rod_axes_b, p.rod_max_dipole, rod_command), field_b))

@@ -33,7 +33,7 @@ def fly(craft, rods=(), steps=1):
     state, momentum, applied = STATE, np.array([0.1, -0.1, 0.05, 0.0]), np.zeros(4)
     rods = np.array(rods, dtype=float)
     for _ in range(steps):
-        state, *_ = advance(craft, state, momentum, COMMAND, rods, ENVIRONMENT, 3e-12, 0.1, applied)
+        state, *_ = advance(craft, state, momentum, COMMAND, rods, ENVIRONMENT, 0.1, applied)
     return state, momentum
 
 
@@ -79,7 +79,7 @@ def test_rod_commands_are_limited_and_numbers():
 def test_disturbances_move_the_body_and_nothing_else(changes):
     craft = build(**changes)
     dcm = mrp_to_dcm(STATE.sigma_bn)
-    torque = disturbances.disturbance_torque(craft.disturbances, craft.body.inertia, dcm, ENVIRONMENT, 0.0)
+    torque = disturbances.disturbance_torque(craft.disturbances, craft.body.inertia, dcm, ENVIRONMENT)
     momentum = np.array([0.1, -0.1, 0.05, 0.0])
     expected, *_ = propagate(craft.body, STATE, momentum, COMMAND, torque, 0.1, np.zeros(4))
     disturbed, flown = fly(craft)

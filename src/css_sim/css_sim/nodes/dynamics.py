@@ -93,7 +93,6 @@ class Dynamics(Plant):
             self._wheels_at_rest if wheels is None else wheels.torque,
             self._rods_at_rest if rods is None else rods.dipole,
             self._surroundings,
-            0.0,
             self.period_ns * 1e-9,
             self._torque,
         )
