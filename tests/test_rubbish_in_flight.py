@@ -71,7 +71,7 @@ def test_flight_with_rubbish_is_the_flight_without(tmp_path, rounds):
         flight.executor.add_node(vandal)
         result = flight.fly(disturb)
         assert result.failure == ""
-        ekf = flight.nodes["ekf"].edges["voltages"].rejected
+        ekf = flight.nodes["ekf"].edges["cells"].rejected
         assert {"wrong_length", "not_finite", "stamp_back", "stamp_jump", "wrong_frame", "malformed"} <= set(ekf)
         flight.executor.remove_node(vandal)
         vandal.destroy_node()
