@@ -26,8 +26,9 @@ from css_recording.errors import BagError
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
 from css_recording.ros_topics import matching_qos, message_class_of, publishers_of_others
 
-_SETTLED_AFTER = 1.0
+_SETTLED_AFTER = 2.0
 _SETTLE_LIMIT = 10.0
+_CONNECT_LIMIT = 5.0
 _LOOK_EVERY = 1.0
 _SPIN = 0.05
 
@@ -136,8 +137,12 @@ class PlayerNode(Node):
                 raise PlaybackError(f"no live node publishes {topic}, which the playback is to wait for")
             self._listen_to(topic)
         if self._options.wait_for:
-            self._wait(self._all_listeners_matched, "no live node listens to the recording")
-        elif not self._all_listeners_matched():
+            self._wait(lambda: self._connected() and self._listeners() > 0, "no live node listens to the recording")
+            return
+        limit = time.monotonic() + _CONNECT_LIMIT
+        while not self._connected() and not self._stopped() and time.monotonic() < limit:
+            self._spin(_SPIN)
+        if not self._listeners():
             self.get_logger().info("no live node listens yet")
 
     def _listen_to(self, topic: str) -> None:
@@ -156,15 +161,15 @@ class PlayerNode(Node):
         )
         self._wait(lambda: subscription.get_publisher_count() > 0, f"{topic} cannot be heard")
 
-    def _all_listeners_matched(self) -> bool:
-        """At least one topic has listeners, and whoever is known to listen is connected."""
-        listeners = 0
-        for topic, publisher in self._publishers_by_topic.items():
-            connected = publisher.get_subscription_count()
-            if connected < self.count_subscribers(topic):
-                return False
-            listeners += connected
-        return listeners > 0
+    def _connected(self) -> bool:
+        """Whoever is known to listen is connected."""
+        return all(
+            publisher.get_subscription_count() >= self.count_subscribers(topic)
+            for topic, publisher in self._publishers_by_topic.items()
+        )
+
+    def _listeners(self) -> int:
+        return sum(publisher.get_subscription_count() for publisher in self._publishers_by_topic.values())
 
     # Playing
 
