@@ -175,6 +175,8 @@ class Codec:
                 pad = -at % field.size
                 parts.append(bytes(pad) + array.tobytes())
                 at += pad + array.size * field.size
+        # DDS fills a payload up to four bytes, with whatever was in memory, unless that is done here
+        parts.append(bytes(-at % 4))
         return b"".join(parts)
 
     def sample(self, stamp_ns: int, frame_id: str, **given: Any) -> Sample:
@@ -249,6 +251,12 @@ def codec_of(message_type: type) -> Codec:
 
 
 def stamp_of(data: bytes) -> int:
-    """Stamp [ns] of any serialised message that begins with a Header, without decoding the rest."""
+    """Stamp [ns] of any serialised message that begins with a Header, without decoding the rest.
+
+    Raises:
+        DecodeError: the bytes are too short or not little-endian CDR.
+    """
+    if len(data) < 12 or data[:4] != _ENCAPSULATION:
+        raise DecodeError(f"{len(data)} bytes do not begin with a Header in little-endian CDR")
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return seconds * 1_000_000_000 + nanoseconds
