@@ -148,5 +148,8 @@ class Plant(Component):
         raise NotImplementedError
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        """Inputs stamped k (None: the partner is lost) to the messages stamped k + 1; sets `finished` at the end."""
+        """Inputs stamped k (None: the partner is lost) to the messages stamped k + 1.
+
+        At the end it sets `finished`; what it returns with that is not sent, for nobody would answer it.
+        """
         raise NotImplementedError

@@ -17,30 +17,34 @@ from rclpy.node import Node
 from rclpy.utilities import get_default_context
 
 _CALLBACKS_BETWEEN_CHECKS = 64
+_MESSAGES_IN_A_ROW = 200
 
 
 class DrainingExecutor(SingleThreadedExecutor):
-    """Takes messages until every subscription is empty, then waits for whatever comes first."""
+    """Takes messages until every subscription is empty, then waits for whatever comes first.
+
+    Where nodes of one process answer each other there is always another message: after `_MESSAGES_IN_A_ROW` it is the
+    turn of timers and services.
+    """
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Delivers all waiting messages; only when there are none, waits and runs one other callback."""
+        """Delivers waiting messages and runs one other callback; waits for it only when there were none."""
         if self._drain():
             timeout_sec = 0.0
         super().spin_once(timeout_sec)
 
-    def _drain(self) -> bool:
-        found = taken = True
-        taken_any = False
-        while found:
-            found = False
+    def _drain(self) -> int:
+        taken, before = 0, -1
+        while before < taken < _MESSAGES_IN_A_ROW:
+            before = taken
             for node in self.get_nodes():
                 for subscription in node.subscriptions:
                     with subscription.handle:
-                        taken = subscription.handle.take_message(subscription.msg_type, subscription.raw)
-                    if taken is not None:
-                        subscription.callback(taken[0])
-                        found = taken_any = True
-        return taken_any
+                        message = subscription.handle.take_message(subscription.msg_type, subscription.raw)
+                    if message is not None:
+                        taken += 1
+                        subscription.callback(message[0])
+        return taken
 
 
 def create_executor(kind: str | None = None, context: Context | None = None) -> Executor:

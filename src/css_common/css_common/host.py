@@ -45,7 +45,7 @@ def rehearse(component_type: type[Component], name: str, values: Values) -> None
         sample = received[source.key] = codec.sample(stand_in.epoch_ns, "", **lengths)
         codec.first_not_finite(codec.real_fields(), codec.decode(codec.encode(sample)))
     # What a component makes of empty messages is its own affair; here only that it has been through it counts.
-    with contextlib.suppress(ArithmeticError, ValueError):
+    with contextlib.suppress(Exception):
         if isinstance(stand_in, Plant):
             stand_in.begin()
         stand_in.cycle(stand_in.epoch_ns, received)
@@ -231,6 +231,11 @@ class ComponentNode(LifecycleNode):
         self.edges.clear()
         self.component = self.matcher = None
 
+    def destroy_node(self) -> None:
+        """Destroys the node now; rclpy alone would leave it, and its name, to the garbage collector."""
+        super().destroy_node()
+        self._state_machine.destroy_when_not_in_use()
+
     def finish(self, seconds: float = 2.0) -> None:
         """Waits until listeners have what was published, so that a message is not lost with its sender."""
         timeout = Duration(seconds=seconds)
@@ -254,9 +259,15 @@ class ComponentNode(LifecycleNode):
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
         sample = edge.accept(data)
-        if sample is not None:
-            for stamp_ns, received in self.matcher.offer(key, sample):
-                self._run(stamp_ns, received)
+        if sample is None:
+            return
+        try:
+            cycles = self.matcher.offer(key, sample)
+        except Exception as error:  # the component begins anew in there when time was set back
+            self._report_failure(error)
+            return
+        for stamp_ns, received in cycles:
+            self._run(stamp_ns, received)
 
     def _run_overdue(self) -> None:
         # Two firings apart: what was pending at the last one and still is has waited a whole deadline.
@@ -268,19 +279,19 @@ class ComponentNode(LifecycleNode):
         self._overdue_stamp = waiting
 
     def _run(self, stamp_ns: int, received: dict[str, Sample | None]) -> None:
-        if self._events:
-            self._apply_events(stamp_ns)
         self._last_stamp = stamp_ns
         if self._began is None:
             self._mark_begin()
         component = self.component
+        # An exception that leaves a callback ends the process, so whatever a component does wrong ends here.
         try:
-            outgoing = (component.cycle if self._is_active else component.idle)(stamp_ns, received)
+            if self._events:
+                self._apply_events(stamp_ns)
+            self._publish((component.cycle if self._is_active else component.idle)(stamp_ns, received))
         except Exception as error:
             self._report_failure(error)
-            return
-        self.counters["cycles"] += 1
-        self._publish(outgoing)
+        else:
+            self.counters["cycles"] += 1
 
     def _publish(self, outgoing: Outgoing) -> None:
         for key, sample in outgoing.items():
@@ -308,7 +319,10 @@ class ComponentNode(LifecycleNode):
             event = self._events.pop(0)
             self.get_logger().info(f"event {event.name} at {event.time:g} s: {event.action} {event.parameter}".rstrip())
             if event.action == "set":
-                self.set_parameters([RosParameter(event.parameter, value=event.value)])
+                (result,) = self.set_parameters([RosParameter(event.parameter, value=event.value)])
+                if not result.successful:
+                    self.counters["events_refused"] += 1
+                    self.get_logger().error(f"event {event.name}: {result.reason}")
             elif event.action == "deactivate" and self._is_active:
                 self.trigger_deactivate()
             elif event.action == "activate" and not self._is_active:
@@ -323,8 +337,16 @@ class ComponentNode(LifecycleNode):
         return None
 
     def _tune(self, canonical: dict) -> None:
-        if self.component is not None:
-            self.component.tune(shaped_values(self._table, canonical))
+        if self.component is None:
+            return
+        values = shaped_values(self._table, canonical)
+        self.matcher.deadline_ns = round(values.io.deadline * 1e9)
+        if self._deadline_timer is not None:
+            self._deadline_timer.timer_period_ns = self.matcher.deadline_ns
+        try:
+            self.component.tune(values)
+        except Exception as error:
+            self._report_failure(error)
 
     # Health
 
@@ -337,6 +359,7 @@ class ComponentNode(LifecycleNode):
                 counters[f"{key}.rejected.{kind}"] = count
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
+            counters["time_set_back"] = self.matcher.set_back
         if self.counters["cycle_failed"] or self.counters["withheld_not_finite"]:
             return DiagnosticStatus.ERROR, "cycles failed", counters
         if any(edge.rejected for edge in self.edges.values()):

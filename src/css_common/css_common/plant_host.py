@@ -6,11 +6,12 @@ Lockstep is event driven: the plant leaves stamp k when every awaited topic has 
 """
 
 import time
+from collections.abc import Collection
 from functools import partial
 
-from css_common.codec import Sample, stamp_of
+from css_common.codec import DecodeError, Sample, stamp_of
 from css_common.component import Outgoing, Plant
-from css_common.edge import Edge, StampGuard
+from css_common.edge import Edge
 from css_common.host import ComponentNode
 
 
@@ -26,6 +27,7 @@ class PlantNode(ComponentNode):
         self._stamp = 0
         self._answers: dict[str, Sample | None] = {}
         self._awaited: dict[str, str] = {}
+        self._divided = False
         self._lost: set[str] = set()
         self._held_back: Outgoing | None = None
         self._begun = False
@@ -33,6 +35,7 @@ class PlantNode(ComponentNode):
         self._warned: set[str] = set()
         self._startup_timer = None
         self._pace_timer = None
+        self._go_on_timer = None
         self._watch = None
 
     @property
@@ -52,34 +55,53 @@ class PlantNode(ComponentNode):
         awaited = self.mission.awaited
         # key of an answer: the component's own name for what it consumes, the topic for what is only awaited
         self._awaited = {consumed.get(topic, topic): topic for topic in awaited}
+        self._divided = any(self.mission.outputs[topic].divider > 1 for topic in awaited)
         for topic in awaited:
             if topic not in consumed:
-                guard = StampGuard(2**62)
-                self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic, guard))
+                self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
         self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)
-        if lockstep.realtime_factor > 0.0 or not self._awaited:
-            # a plant that nobody answers needs a timer in any case: it would never return to its executor
-            factor = lockstep.realtime_factor or 1e9
-            period = max(self.component.period_ns * 1e-9 / factor, 1e-4)
+        # A step in which nobody is waited for goes on by a timer: the executor must get to partners that come back.
+        self._go_on_timer = self.create_timer(1e-4, self._go_on, clock=self._steady)
+        self._go_on_timer.cancel()
+        if lockstep.realtime_factor > 0.0:
+            period = max(self.component.period_ns * 1e-9 / lockstep.realtime_factor, 1e-4)
             self._pace_timer = self.create_timer(period, self._on_pace, clock=self._steady)
 
     def _activate(self) -> None:
-        super()._activate()
+        # no fresh state here: a plant that was deactivated has paused, and time goes on where it stood
+        self._is_active = True
         self._waiting_since = time.monotonic()
-        if not self._begun:
+        if self._begun:
+            self._go_on_timer.reset()
+        else:
             self._startup_timer = self.create_timer(0.01, self._try_to_begin, clock=self._steady)
 
+    def _deactivate(self) -> None:
+        super()._deactivate()
+        self._end_startup()
+
     def _clean_up(self) -> None:
-        for timer in (self._startup_timer, self._pace_timer, self._watch):
+        self._end_startup()
+        for timer in (self._pace_timer, self._go_on_timer, self._watch):
             if timer is not None:
                 self.destroy_timer(timer)
-        self._startup_timer = self._pace_timer = self._watch = None
+        self._pace_timer = self._go_on_timer = self._watch = None
+        self._begun = False
+        self._held_back = None
+        self._answers.clear()
+        self._lost.clear()
+        self._warned.clear()
         super()._clean_up()
+
+    def _end_startup(self) -> None:
+        if self._startup_timer is not None:
+            self.destroy_timer(self._startup_timer)
+            self._startup_timer = None
 
     # Start
 
     def _try_to_begin(self) -> None:
-        if self._begun or self.done:  # firings of the timer that were under way when it was destroyed
+        if self._startup_timer is None:  # firings of the timer that were under way when it was destroyed
             return
         absent = self._absent_partners()
         rivals = self._rivals()
@@ -92,8 +114,7 @@ class PlantNode(ComponentNode):
             return
         if rivals and waited < lockstep.warn_after:
             return  # a flight that has just ended may still be leaving
-        self.destroy_timer(self._startup_timer)
-        self._startup_timer = None
+        self._end_startup()
         if rivals:
             self.failed = (
                 f"another node publishes {', '.join(rivals)}: two flights in one ROS_DOMAIN_ID answer each other; "
@@ -105,11 +126,15 @@ class PlantNode(ComponentNode):
             self.get_logger().error(self.failed)
             self.done = True
             return
-        outgoing = self.component.begin()
         self._begun = True
         self._warned.clear()
         self._mark_begin()
-        self._go_to(self.mission.epoch_ns, outgoing)
+        try:
+            outgoing = self.component.begin()
+        except Exception as error:
+            self._fail(error)
+        else:
+            self._go_to(self.mission.epoch_ns, outgoing)
 
     def _rivals(self) -> list[str]:
         return [topic for *_, topic in self._output_ports.values() if self.count_publishers(topic) > 1]
@@ -138,11 +163,24 @@ class PlantNode(ComponentNode):
         self._answers.clear()
         self._waiting_since = time.monotonic()
         self.counters["cycles"] += 1
-        if self._events:
-            self._apply_events(stamp_ns)
-        self._publish(outgoing)
-        if not self._awaited:
-            self._advance()
+        try:
+            if self._events:
+                self._apply_events(stamp_ns)
+            self._publish(outgoing)
+        except Exception as error:
+            self._fail(error)
+            return
+        if not self._needed():
+            self._go_on_timer.reset()
+
+    def _go_on(self) -> None:
+        self._go_on_timer.cancel()
+        self._advance_if_answered()
+
+    def _fail(self, error: Exception) -> None:
+        self._report_failure(error)
+        self.failed = f"the plant failed at stamp {self._stamp}: {error}"
+        self.done = True
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
         if edge.source.topic in self._lost:
@@ -152,23 +190,34 @@ class PlantNode(ComponentNode):
         if sample is not None:
             self._take(key, edge.source.topic, sample.stamp_ns, sample)
 
-    def _note(self, topic: str, guard: StampGuard, data: bytes) -> None:
-        stamp_ns = stamp_of(data)
-        if guard.refusal(stamp_ns) is None:
-            self._take(topic, topic, stamp_ns, None)
+    def _note(self, topic: str, data: bytes) -> None:
+        try:
+            stamp_ns = stamp_of(data)
+        except DecodeError:
+            self.counters["malformed_answers"] += 1
+            return
+        self._take(topic, topic, stamp_ns, None)
 
     def _take(self, key: str, topic: str, stamp_ns: int, sample: Sample | None) -> None:
+        if topic in self._lost:
+            # Whatever stamp it answers, it is alive: time must hold for it, or it would never catch up.
+            self._lost.discard(topic)
+            self.get_logger().info(f"{topic} is back")
         if stamp_ns != self._stamp:
             self.counters["answers_for_another_stamp"] += 1
             return
-        if topic in self._lost:
-            self._lost.discard(topic)
-            self.get_logger().info(f"{topic} is back")
         self._answers[key] = sample
-        if self._is_active and self._held_back is None and all(k in self._answers for k in self._needed()):
+        self._advance_if_answered()
+
+    def _advance_if_answered(self) -> None:
+        if not self._begun or self.done or not self._is_active or self._held_back is not None:
+            return
+        if all(key in self._answers for key in self._needed()):
             self._advance()
 
-    def _needed(self) -> list[str]:
+    def _needed(self) -> Collection[str]:
+        if not self._divided and not self._lost:
+            return self._awaited
         outputs = self.mission.outputs
         step = self.component.step_of(self._stamp)
         return [
@@ -183,9 +232,7 @@ class PlantNode(ComponentNode):
         try:
             outgoing = self.component.cycle(stamp_ns, {key: self._answers.get(key) for key in keys})
         except Exception as error:
-            self._report_failure(error)
-            self.failed = f"the plant failed at stamp {stamp_ns}: {error}"
-            self.done = True
+            self._fail(error)
             return
         if self.component.finished:
             self.done = True
@@ -195,6 +242,8 @@ class PlantNode(ComponentNode):
             self._held_back = outgoing
 
     def _on_pace(self) -> None:
+        if not self._is_active:
+            return
         if self._held_back is not None:
             outgoing, self._held_back = self._held_back, None
             self._go_to(self._stamp + self.component.period_ns, outgoing)

@@ -103,9 +103,11 @@ def guard(
     def on_set(parameters: list[RosParameter]) -> SetParametersResult:
         try:
             changed = checked(parameters)
+            reason = refuse(canonical | changed) if changed else None
         except (ParameterError, TypeError) as error:
             return SetParametersResult(successful=False, reason=str(error))
-        reason = refuse(canonical | changed) if changed else None
+        except Exception as error:  # out of the service it would end the process
+            return SetParametersResult(successful=False, reason=f"the check itself failed: {error!r}")
         return SetParametersResult(successful=reason is None, reason=reason or "")
 
     def after_set(parameters: list[RosParameter]) -> None:

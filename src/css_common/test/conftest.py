@@ -2,12 +2,13 @@
 """The made-up package of components, missions of it, and nodes in a ROS context of their own."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from css_common.mission import Mission, mission_from_text
+from css_common.testing import Bench
 
 sys.path.insert(0, str(Path(__file__).parent / "workspace"))
 
@@ -35,3 +36,10 @@ def mission() -> Callable[..., Mission]:
         return mission_from_text(text, "bench.yaml", overrides)
 
     return build
+
+
+@pytest.fixture(params=["events", "draining"])
+def bench(request: pytest.FixtureRequest) -> Iterator[Bench]:
+    """Nodes in this process, with either executor."""
+    with Bench(request.param) as bench:
+        yield bench
