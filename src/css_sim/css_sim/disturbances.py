@@ -13,15 +13,25 @@ import numpy as np
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, flag, real, reals
 from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, norm, scale, unit
-from css_environment.constants import EARTH_MU, EARTH_ROTATION_RATE
+from css_environment.atmosphere import ATMOSPHERE_400_KM, ExponentialAtmosphere, air_velocity, density
+from css_environment.constants import EARTH_MU
 from css_environment.ephemeris import EnvironmentState
 
 PARAMETERS: Table = (
     flag("disturbances.gravity_gradient", False, "torque of the Earth's gravity gradient"),
     flag("disturbances.aerodynamic", False, "torque of drag on the panels"),
     flag("disturbances.solar_pressure", False, "torque of sunlight on the panels"),
-    real("disturbances.air_density", 3e-12, "kg/m^3", "density of the air along the orbit", low=0.0, high=1.0),
     reals("disturbances.dipole", (0.0, 0.0, 0.0), "A m^2", "residual magnetic dipole of the spacecraft", length=3),
+    real("air.density", ATMOSPHERE_400_KM.reference_density, "kg/m^3", "density at air.altitude", low=0.0, high=1.0),
+    real("air.altitude", ATMOSPHERE_400_KM.reference_altitude, "m", "where air.density holds", low=0.0, high=1e7),
+    real(
+        "air.scale_height",
+        ATMOSPHERE_400_KM.scale_height,
+        "m",
+        "climb over which the density falls by 1/e",
+        low=100.0,
+        high=1e7,
+    ),
     reals("panels.areas", (), "m^2", "area of each flat panel; a plate with two sides is two panels", low=0.0),
     reals("panels.normals", (), "-", "outward unit normals of the panels in b, a row each", columns=3),
     reals("panels.centres", (), "m", "centres of the panels in b from the centre of mass, a row each", columns=3),
@@ -43,7 +53,7 @@ class Disturbances(NamedTuple):
     gravity_gradient: bool
     aerodynamic: bool
     solar_pressure: bool
-    air_density: float  # [kg/m^3]
+    atmosphere: ExponentialAtmosphere
     dipole_b: Vec3  # [A m^2]
     drag_coefficient: float
     specular: float
@@ -62,7 +72,7 @@ def parameters(values: Values) -> Disturbances:
         gravity_gradient=values.disturbances.gravity_gradient,
         aerodynamic=values.disturbances.aerodynamic,
         solar_pressure=values.disturbances.solar_pressure,
-        air_density=values.disturbances.air_density,
+        atmosphere=ExponentialAtmosphere(values.air.density, values.air.altitude, values.air.scale_height),
         dipole_b=(x, y, z),
         drag_coefficient=values.panels.drag_coefficient,
         specular=values.panels.specular,
@@ -98,17 +108,11 @@ def gravity_gradient_torque(inertia: Mat3, r_b: Vec3) -> Vec3:
 
 
 @kernel
-def air_velocity(r_n: Vec3, v_n: Vec3) -> Vec3:
-    """Velocity [m/s] relative to air that turns with the Earth (axis taken as the z axis of n)."""
-    return (v_n[0] + EARTH_ROTATION_RATE * r_n[1], v_n[1] - EARTH_ROTATION_RATE * r_n[0], v_n[2])
-
-
-@kernel
-def aerodynamic_torque(panels, drag_coefficient: float, velocity_b: Vec3, density: float) -> Vec3:
-    """Torque [N m] of air of `density` [kg/m^3] met at `velocity_b` [m/s]; momentum flux opposes the velocity."""
+def aerodynamic_torque(panels, drag_coefficient: float, velocity_b: Vec3, air_density: float) -> Vec3:
+    """Torque [N m] of air of a given density [kg/m^3] met at `velocity_b` [m/s]; momentum flux opposes the velocity."""
     speed = norm(velocity_b)
     wind = unit(velocity_b)
-    pressure = 0.5 * density * drag_coefficient * speed * speed
+    pressure = 0.5 * air_density * drag_coefficient * speed * speed
     moment = (0.0, 0.0, 0.0)
     for i in range(panels.shape[0]):
         panel = panels[i]
@@ -147,8 +151,9 @@ def disturbance_torque(p: Disturbances, inertia: Mat3, dcm_bn: Mat3, environment
     if p.gravity_gradient:
         torque = add(torque, gravity_gradient_torque(inertia, multiply(dcm_bn, environment.r_n)))
     if p.aerodynamic:
+        air_density = density(p.atmosphere, environment.r_n)
         velocity_b = multiply(dcm_bn, air_velocity(environment.r_n, environment.v_n))
-        torque = add(torque, aerodynamic_torque(p.panels, p.drag_coefficient, velocity_b, p.air_density))
+        torque = add(torque, aerodynamic_torque(p.panels, p.drag_coefficient, velocity_b, air_density))
     if p.solar_pressure and environment.illumination > 0.0:
         pressure = SOLAR_PRESSURE * environment.solar_flux * environment.illumination
         sun_b = multiply(dcm_bn, environment.sun_n)
