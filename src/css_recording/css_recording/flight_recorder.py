@@ -12,7 +12,7 @@ from collections.abc import Mapping
 
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
-from css_recording.schemas import dependencies, schema_of
+from css_recording.schemas import first_field_type, schema_of
 
 _STAMP = struct.Struct("<iI")
 _STAMPED_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
@@ -25,11 +25,7 @@ def is_stamped(topic: Topic) -> bool:
     """Whether messages begin with a stamp (a Header or a Time) that tells the time of the flight."""
     if topic.name in _WALL_CLOCK_TOPICS:
         return False
-    text = (topic.schema or schema_of(topic.type)).text
-    for line in text.splitlines():
-        if line.split("#", 1)[0].strip():
-            return dependencies(topic.type, line)[:1] in ([name] for name in _STAMPED_FIRST)
-    return False
+    return first_field_type(topic.schema or schema_of(topic.type)) in _STAMPED_FIRST
 
 
 class FlightRecorder:

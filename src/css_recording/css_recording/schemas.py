@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from css_recording.errors import BagError
@@ -72,6 +73,15 @@ def schema_of(type_name: str) -> MessageSchema:
         parts.append(f"{_SEPARATOR}\nMSG: {'/'.join(split_type_name(name))}\n{text}")
     full_text = "\n".join(part.rstrip("\n") for part in parts) + "\n"
     return MessageSchema(type_name, full_text, _installed_hash(type_name) or hash_of(type_name, full_text))
+
+
+def first_field_type(schema: MessageSchema) -> str | None:
+    """Full name of the message type of the first field; None when it is no message, or there is no field."""
+    root = schema.text.split(_SEPARATOR, 1)[0]
+    _, fields = get_types_from_msg(root, schema.type_name)[schema.type_name]
+    if not fields or fields[0][1][0] != Nodetype.NAME:
+        return None
+    return str(fields[0][1][1])
 
 
 def hash_of(type_name: str, text: str) -> str:

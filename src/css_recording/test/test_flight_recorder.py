@@ -28,7 +28,10 @@ def recorded(recorder):
 @pytest.mark.parametrize(
     ("name", "type_name", "stamped"),
     [
-        ("/css/voltages", "css_msgs/msg/CssVoltages", True),
+        *[
+            (f"/{name}", f"css_msgs/msg/{name}", True)
+            for name in ("CssVoltages", "ControlStatus", "SunEstimate", "SpacecraftState", "WheelState")
+        ],
         ("/imu", "sensor_msgs/msg/Imu", True),
         ("/header", "std_msgs/msg/Header", True),
         ("/clock", "rosgraph_msgs/msg/Clock", True),
