@@ -50,7 +50,8 @@ def fly_directly(mission: Mission) -> FlightLog:
     if mission.plant is None:
         raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
-    wires = {topic: _Wire(message_type, mission.steps) for topic, message_type in mission.topics.items()}
+    steps = max(mission.steps, 1)
+    wires = {topic: _Wire(message_type, steps) for topic, message_type in mission.topics.items()}
     stamp_ns = mission.epoch_ns
     plant.apply_events(stamp_ns)
     outgoing = plant.component.begin()
@@ -59,7 +60,7 @@ def fly_directly(mission: Mission) -> FlightLog:
         plant.publish(outgoing, wires, bus)
         for part in others:
             part.answer(stamp_ns, wires, bus)
-        outgoing = plant.component.cycle(stamp_ns, {key: bus.get(topic) for key, topic, *_ in plant.inputs})
+        outgoing = plant.component.cycle(stamp_ns, plant.received(bus))
         stamp_ns += mission.period_ns
         plant.apply_events(stamp_ns)
     log = FlightLog(f"{mission.name}_{mission.values.mission.case}", mission)
@@ -76,33 +77,35 @@ class _Wire:
 
     def __init__(self, message_type: type, messages: int) -> None:
         self._fields = codec_of(message_type).fields
-        self._columns = Columns(np.zeros(messages, dtype=np.int64))
+        self._stamp_ns = np.zeros(messages, dtype=np.int64)
+        self._columns: list[tuple[str, np.ndarray, bool]] = []  # name, column, whether it holds arrays
         self._count = 0
 
     def carry(self, sample: Sample) -> Sample:
         """The message as a listener gets it."""
-        at, given, columns = self._count, vars(sample), vars(self._columns)
+        given, at = sample.__dict__, self._count
         if at == 0:
             self._allocate(given)
-        heard = Sample(sample.stamp_ns, sample.frame_id)
-        fields = vars(heard)
-        columns["stamp_ns"][at] = sample.stamp_ns
-        for field in self._fields:
-            column, value = columns[field.name], given[field.name]
-            column[at] = value
-            fields[field.name] = value if field.count is None else column[at]
+        heard = Sample.__new__(Sample)
+        fields = heard.__dict__
+        fields["stamp_ns"] = self._stamp_ns[at] = sample.stamp_ns
+        fields["frame_id"] = sample.frame_id
+        for name, column, holds_arrays in self._columns:
+            column[at] = value = given[name]
+            fields[name] = column[at] if holds_arrays else value
         self._count = at + 1
         return heard
 
     def columns(self) -> Columns:
         """What was carried."""
-        return Columns(**{name: column[: self._count] for name, column in vars(self._columns).items()})
+        fields = {name: column[: self._count] for name, column, _ in self._columns}
+        return Columns(self._stamp_ns[: self._count], **fields)
 
     def _allocate(self, first: Mapping[str, Any]) -> None:
-        rows = len(self._columns)
+        rows = len(self._stamp_ns)
         for field in self._fields:
             shape = (rows,) if field.count is None else (rows, field.count or len(first[field.name]))
-            vars(self._columns)[field.name] = np.zeros(shape, field.dtype)
+            self._columns.append((field.name, np.zeros(shape, field.dtype), field.count is not None))
 
 
 Wires = Mapping[str, _Wire]
@@ -113,7 +116,8 @@ class _Part:
 
     def __init__(self, node: Node, mission: Mission) -> None:
         self.component: Component | Plant = node.component(node.name, node.values)
-        self.inputs = [(i.key, i.topic, i.divider, i.required) for i in node.inputs]
+        self._inputs = [(i.key, i.topic) for i in node.inputs]
+        self._required = [(i.topic, i.divider) for i in node.inputs if i.required]
         self._topics = {output.key: output.topic for output in node.outputs}
         self._canonical = dict(node.canonical)
         self._events: list[Event] = [event for event in mission.events if event.node == node.name]
@@ -122,15 +126,17 @@ class _Part:
 
     def answer(self, stamp_ns: int, wires: Wires, bus: dict[str, Sample]) -> None:
         """One cycle; none when an input that is due did not come."""
-        received = {key: bus.get(topic) for key, topic, _, _ in self.inputs}
-        step = self.component.step_of(stamp_ns)
-        for key, _, divider, required in self.inputs:
-            if required and received[key] is None and step % divider == 0:
+        for topic, divider in self._required:
+            if topic not in bus and self.component.step_of(stamp_ns) % divider == 0:
                 return
         if self._events:
             self.apply_events(stamp_ns)
         cycle = self.component.cycle if self._is_active else self.component.idle
-        self.publish(cycle(stamp_ns, received), wires, bus)
+        self.publish(cycle(stamp_ns, self.received(bus)), wires, bus)
+
+    def received(self, bus: Mapping[str, Sample]) -> dict[str, Sample | None]:
+        """The inputs of the step, None for what did not come."""
+        return {key: bus.get(topic) for key, topic in self._inputs}
 
     def publish(self, outgoing: Outgoing, wires: Wires, bus: dict[str, Sample]) -> None:
         """Send what a component gave."""

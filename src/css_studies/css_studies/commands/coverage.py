@@ -106,7 +106,7 @@ def _hole(hole: dict[str, Any]) -> str:
     x, y, z = (round(part, 3) + 0.0 for part in hole["centre_b"])
     if x == y == z == 0.0:
         return f"all around the body, {size}"
-    return f"about ({x:.3f}, {y:.3f}, {z:.3f}), {size}, as large as a cone of {hole['half_angle_deg']:.1f} deg half angle"
+    return f"about ({x:.3f}, {y:.3f}, {z:.3f}), {size}, a cone of half angle {hole['half_angle_deg']:.1f} deg"
 
 
 def _error_rows(*results: dict[str, Any]) -> list[tuple[str, list[str]]]:
