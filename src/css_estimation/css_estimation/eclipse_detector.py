@@ -19,7 +19,9 @@ from css_estimation.sun_heading import (
 )
 
 PARAMETERS: Table = (
-    choice("eclipse.source", "sensors", ("sensors", "model", "both"), "who decides; both: must agree"),
+    choice(
+        "eclipse.source", "sensors", ("sensors", "model", "both"), "who decides on eclipse; both: the two must agree"
+    ),
     real("eclipse.dark_level", 0.12, "-", "brightest output below which it is dark", low=0.0, high=1.0),
     real("eclipse.dark_time", 10.0, "s", "darkness that begins an eclipse", low=0.0, high=1e4),
     real("eclipse.lit_level", 0.3, "-", "brightest output above which it is light", low=0.0, high=1.0),

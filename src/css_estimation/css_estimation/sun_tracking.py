@@ -37,9 +37,9 @@ from css_estimation.sun_rate import rate_from_sun_vectors
 PARAMETERS: Table = (
     flag("use_gyro", True, "use the gyro while it delivers; off: rates from Sun vectors", tunable=True),
     real("rate.cutoff", 0.1, "Hz", "corner of the first-order low-pass on the rate", low=0.0, high=1e3),
-    real("rate.limit_deg", 10.0, "deg/s", "bound on each axis of a Sun-derived rate", low=0.0, high=360.0),
-    real("rate.gyro_limit_deg", 300.0, "deg/s", "a gyro reading beyond it is not used", low=0.0, high=1e4),
-    choice("rate.without_information", "hold", ("hold", "zero"), "rate while none is measured"),
+    real("rate.limit_deg_s", 10.0, "deg/s", "bound on each axis of a Sun-derived rate", low=0.0, high=360.0),
+    real("rate.gyro_limit_deg_s", 300.0, "deg/s", "a gyro reading beyond it is not used", low=0.0, high=1e4),
+    choice("rate.without_information", "hold", ("hold", "zero"), "filtered rate while none is measured"),
     *eclipse_detector.PARAMETERS,
 )
 
@@ -87,8 +87,8 @@ def parameters(values: Values) -> TrackingParameters:
     return TrackingParameters(
         use_gyro=values.use_gyro,
         cutoff=rate.cutoff,
-        rate_limit=math.radians(rate.limit_deg),
-        gyro_limit=math.radians(rate.gyro_limit_deg),
+        rate_limit=math.radians(rate.limit_deg_s),
+        gyro_limit=math.radians(rate.gyro_limit_deg_s),
         hold_rate=rate.without_information == "hold",
         eclipse=eclipse_detector.parameters(values),
     )

@@ -29,7 +29,7 @@ from css_estimation.sun_tracking import (
 )
 
 PARAMETERS: Table = (
-    choice("gate_kind", "relative", ("relative", "absolute"), "gate as a share of the brightest, or as output"),
+    choice("gate_kind", "relative", ("relative", "absolute"), "gate as a share of the brightest cell, or as an output"),
     real("gate", 0.45, "-", "a cell above the gate sees the Sun", low=0.0, high=1.0, tunable=True),
     real("minimum_output", 0.1, "-", "no Sun unless a cell is above it", low=0.0, high=1.0, tunable=True),
     flag("propagate_held", True, "without Sun, turn the held vector with the gyro"),

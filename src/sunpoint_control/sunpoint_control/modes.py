@@ -26,7 +26,7 @@ PARAMETERS: Table = (
     flag("enabled", True, "off: safe mode, actuators at rest", tunable=True),
     integer("modes.debounce", 3, "samples", "samples in a row that must want another mode", low=2, high=1000),
     real(
-        "modes.detumble_rate_deg",
+        "modes.detumble_rate_deg_s",
         10.0,
         "deg/s",
         "body rate above which it is damped first",
@@ -34,7 +34,7 @@ PARAMETERS: Table = (
         high=360.0,
     ),
     real(
-        "modes.detumble_exit_rate_deg",
+        "modes.detumble_exit_rate_deg_s",
         5.0,
         "deg/s",
         "body rate below which pointing resumes",
@@ -58,7 +58,7 @@ PARAMETERS: Table = (
         high=180.0,
     ),
     real("modes.search_wait", 20.0, "s", "sunlit time without Sun before the search begins", low=0.0, high=1e4),
-    real("modes.search_rate_deg", 1.0, "deg/s", "body rate of the search", low=0.01, high=2.0),
+    real("modes.search_rate_deg_s", 1.0, "deg/s", "body rate of the search", low=0.01, high=2.0),
     real(
         "modes.search_angle_deg",
         360.0,
@@ -124,13 +124,13 @@ def parameters(values: Values) -> ModeParameters:
     return ModeParameters(
         enabled=values.enabled,
         debounce=m.debounce,
-        detumble_rate=math.radians(m.detumble_rate_deg),
-        detumble_exit_rate=math.radians(m.detumble_exit_rate_deg),
+        detumble_rate=math.radians(m.detumble_rate_deg_s),
+        detumble_exit_rate=math.radians(m.detumble_exit_rate_deg_s),
         point_angle=math.radians(m.point_angle_deg),
         acquire_angle=math.radians(m.acquire_angle_deg),
         search_wait=m.search_wait,
-        search_rate=math.radians(m.search_rate_deg),
-        search_phase_time=m.search_angle_deg / m.search_rate_deg,
+        search_rate=math.radians(m.search_rate_deg_s),
+        search_phase_time=m.search_angle_deg / m.search_rate_deg_s,
         search_lit_time=m.search_lit_time,
     )
 
@@ -138,8 +138,8 @@ def parameters(values: Values) -> ModeParameters:
 def conflicts(values: Values):
     """Thresholds whose hysteresis is upside down, one message each."""
     m = values.modes
-    if m.detumble_exit_rate_deg > m.detumble_rate_deg:
-        yield "modes.detumble_exit_rate_deg: above modes.detumble_rate_deg, expected at most that"
+    if m.detumble_exit_rate_deg_s > m.detumble_rate_deg_s:
+        yield "modes.detumble_exit_rate_deg_s: above modes.detumble_rate_deg_s, expected at most that"
     if m.point_angle_deg > m.acquire_angle_deg:
         yield "modes.point_angle_deg: above modes.acquire_angle_deg, expected at most that"
 

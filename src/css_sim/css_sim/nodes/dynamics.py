@@ -70,7 +70,7 @@ class Dynamics(Plant):
         values = self.values
         key = random_key(values.mission.seed, values.mission.case)
         self._craft = spacecraft(values, key, values.substeps)
-        self._environment = flight_environment.FlightEnvironment(values)
+        self._environment = flight_environment.flight_environment(values)
         self._state = initial_conditions.initial_state(initial_conditions.parameters(values), key)
         self._momentum = initial_conditions.initial_wheel_momentum(
             self._craft.body, self._state.omega_bn_b, values.initial.wheel_speed_rpm

@@ -14,8 +14,14 @@ from css_msgs.msg import SpacecraftState
 from css_sim import magnetometer
 
 
+_NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+
+
 class Magnetometer(Component):
-    """Geomagnetic field in the body frame with bias and noise, every `magnetometer.divider` cycles."""
+    """Geomagnetic field in the body frame with bias and noise, every `magnetometer.divider` cycles.
+
+    Deactivated, it says for every stamp that is due that it has no measurement (covariance -1).
+    """
 
     shared = ("magnetometer",)
     parameters = magnetometer.PARAMETERS
@@ -36,17 +42,24 @@ class Magnetometer(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         step = self.step_of(stamp_ns)
-        if step % self.values.magnetometer.divider:
+        if not self._is_due(step):
             return {}
         truth = received["truth"]
         s1, s2, s3 = truth.sigma_bn.tolist()
         x, y, z = truth.field_n.tolist()
         field_b = multiply(mrp_to_dcm((s1, s2, s3)), (x, y, z))
         measured = magnetometer.measure(self._p, self._bias_b, self._key, step, field_b)
+        return self._field(stamp_ns, np.array(measured), self._covariance)
+
+    def idle(self, stamp_ns: int, received: Received) -> Outgoing:
+        return self._field(stamp_ns, np.zeros(3), _NOTHING) if self._is_due(self.step_of(stamp_ns)) else {}
+
+    def _is_due(self, step: int) -> bool:
+        return step % self.values.magnetometer.divider == 0
+
+    def _field(self, stamp_ns: int, field_b: np.ndarray, covariance: np.ndarray) -> Outgoing:
         return {
-            "field": self.message(
-                "field", stamp_ns, magnetic_field=np.array(measured), magnetic_field_covariance=self._covariance
-            )
+            "field": self.message("field", stamp_ns, magnetic_field=field_b, magnetic_field_covariance=covariance)
         }
 
 

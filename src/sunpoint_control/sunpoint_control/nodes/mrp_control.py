@@ -110,7 +110,7 @@ class MrpControl(Component):
     def _field(self, stamp_ns: int, received: Received) -> tuple[tuple[float, float, float], bool]:
         """Last field measurement, for as long as the next may be on its way."""
         field = received.get("field")
-        if field is not None:
+        if field is not None and field.magnetic_field_covariance[0] != -1.0:
             self._field_b = _vector(field.magnetic_field)
             self._field_stamp_ns = stamp_ns
         if self._field_stamp_ns is None:

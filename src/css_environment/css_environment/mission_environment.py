@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The environment along the orbit of a mission, at any time: tables built segment by segment as they are needed.
+
+The simulated truth builds one with the truth's parameters, flight software one with the flight's own.
+"""
+
+from functools import lru_cache
+
+from css_common.epochs import parse_utc
+from css_common.schema import Values
+from css_environment import ephemeris
+from css_environment.constants import EARTH_RADIUS
+from css_environment.ephemeris import EnvironmentState, Ephemeris
+from css_environment.orbit import Orbit, TleOrbit, keplerian_orbit
+
+# Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
+_segment_tables = lru_cache(maxsize=4)(ephemeris.build_ephemeris)
+
+
+def mission_orbit(values: Values) -> Orbit:
+    """The orbit of a mission's `orbit` section."""
+    o = values.orbit
+    if o.source == "tle":
+        return TleOrbit(o.tle_line1, o.tle_line2)
+    return keplerian_orbit(
+        EARTH_RADIUS + o.altitude,
+        o.eccentricity,
+        o.inclination_deg,
+        o.raan_deg,
+        o.argument_of_perigee_deg,
+        o.true_anomaly_deg,
+        o.j2,
+    )
+
+
+class MissionEnvironment:
+    """Environment of the mission's `orbit` section."""
+
+    def __init__(self, values: Values, *, field: bool, conical_shadow: bool = True) -> None:
+        """Prepares the tables.
+
+        Args:
+            values: sections mission and orbit.
+            field: compute the geomagnetic field; else it is zero.
+            conical_shadow: shape of the Earth's shadow, with a penumbra or a cylinder.
+        """
+        self._orbit = mission_orbit(values)
+        self._epoch_ns = parse_utc(values.mission.epoch)
+        self._field = field
+        self._conical_shadow = conical_shadow
+        self._tables: Ephemeris | None = None
+
+    def tables(self, elapsed_s: float) -> Ephemeris:
+        """Tables that hold an instant [s after the epoch]."""
+        if self._tables is None or not ephemeris.covers(self._tables, elapsed_s):
+            self._tables = _segment_tables(
+                self._orbit,
+                self._epoch_ns,
+                ephemeris.segment_start(elapsed_s),
+                field=self._field,
+                conical_shadow=self._conical_shadow,
+            )
+        return self._tables
+
+    def at(self, elapsed_s: float) -> EnvironmentState:
+        """Environment at an instant [s after the epoch]."""
+        return ephemeris.at(self.tables(elapsed_s), elapsed_s)
