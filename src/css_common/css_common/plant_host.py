@@ -9,6 +9,9 @@ import time
 from collections.abc import Collection
 from functools import partial
 
+from builtin_interfaces.msg import Time
+from rosgraph_msgs.msg import Clock
+
 from css_common.codec import DecodeError, Sample, stamp_of
 from css_common.component import Outgoing, Plant
 from css_common.edge import Edge
@@ -37,6 +40,7 @@ class PlantNode(ComponentNode):
         self._pace_timer = None
         self._go_on_timer = None
         self._watch = None
+        self._clock_publisher = None
 
     @property
     def stamp_ns(self) -> int:
@@ -59,6 +63,8 @@ class PlantNode(ComponentNode):
         for topic in awaited:
             if topic not in consumed:
                 self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
+        if lockstep.publish_clock:
+            self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
         self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)
         # A step in which nobody is waited for goes on by a timer: the executor must get to partners that come back.
         self._go_on_timer = self.create_timer(1e-4, self._go_on, clock=self._steady)
@@ -86,6 +92,9 @@ class PlantNode(ComponentNode):
             if timer is not None:
                 self.destroy_timer(timer)
         self._pace_timer = self._go_on_timer = self._watch = None
+        if self._clock_publisher is not None:
+            self.destroy_publisher(self._clock_publisher)
+            self._clock_publisher = None
         self._begun = False
         self._held_back = None
         self._answers.clear()
@@ -166,6 +175,9 @@ class PlantNode(ComponentNode):
         try:
             if self._events:
                 self._apply_events(stamp_ns)
+            if self._clock_publisher is not None:
+                seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
+                self._clock_publisher.publish(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))
             self._publish(outgoing)
         except Exception as error:
             self._fail(error)

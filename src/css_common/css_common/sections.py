@@ -117,6 +117,7 @@ LOCKSTEP: Table = (
         "wall time of silence before the flight goes on without the partner, actuators at rest",
         low=0.1,
     ),
+    flag("lockstep.publish_clock", False, "also publish simulated time on /clock, for tools that follow it"),
     integer("lockstep.recorders", 0, "-", "recorders that must be listening before the first step", low=0, high=16),
     real("lockstep.startup_limit", 180.0, "s", "wall time allowed for all partners to appear", low=0.1),
 )
