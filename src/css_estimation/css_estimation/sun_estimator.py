@@ -54,13 +54,15 @@ class SunEstimator(Component):
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
+        cells = received["cells"]
+        assert cells is not None  # a required input
         gyro_b, gyro_valid = gyro_reading(received["gyro"])
         predicted = PREDICTION_UNKNOWN if self._prediction is None else self._prediction.at(stamp_ns)
         self._state, heading = self.algorithm.step(
             self._parameters,
             self._state,
             since_ns / 1e9,
-            received["cells"].voltages,
+            cells.voltages,
             gyro_b,
             gyro_valid,
             predicted,

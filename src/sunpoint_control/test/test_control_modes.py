@@ -191,8 +191,8 @@ def test_a_mode_lasts_at_least_the_debounce(samples, debounce):
 
 
 def test_conflicts_name_the_parameter():
-    values = default_values(modes.PARAMETERS, modes__point_angle_deg=40.0, modes__detumble_exit_rate_deg=20.0)
+    values = default_values(modes.PARAMETERS, modes__point_angle_deg=40.0, modes__detumble_exit_rate_deg_s=20.0)
     messages = list(modes.conflicts(values))
     assert any(m.startswith("modes.point_angle_deg") for m in messages)
-    assert any(m.startswith("modes.detumble_exit_rate_deg") for m in messages)
+    assert any(m.startswith("modes.detumble_exit_rate_deg_s") for m in messages)
     assert not list(modes.conflicts(default_values(modes.PARAMETERS)))

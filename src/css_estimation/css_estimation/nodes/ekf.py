@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kalman-filtered Sun heading."""
 
+from types import ModuleType
+from typing import ClassVar
+
 from css_common.run import node_main
 from css_estimation import sunline_ekf
 from css_estimation.sun_estimator import SunEstimator
@@ -9,7 +12,7 @@ from css_estimation.sun_estimator import SunEstimator
 class Ekf(SunEstimator):
     """Sun heading by an extended Kalman filter that turns with the body rate (O'Keefe & Schaub 2013)."""
 
-    algorithm = sunline_ekf
+    algorithm: ClassVar[ModuleType] = sunline_ekf
     parameters = sunline_ekf.PARAMETERS
 
 

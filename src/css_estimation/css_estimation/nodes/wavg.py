@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Weighted-average Sun heading."""
 
+from types import ModuleType
+from typing import ClassVar
+
 from css_common.run import node_main
 from css_estimation import wavg
 from css_estimation.sun_estimator import SunEstimator
@@ -9,7 +12,7 @@ from css_estimation.sun_estimator import SunEstimator
 class Wavg(SunEstimator):
     """Sun heading as the average of the lit cells' normals, weighted by their outputs (O'Keefe & Schaub 2013)."""
 
-    algorithm = wavg
+    algorithm: ClassVar[ModuleType] = wavg
     parameters = wavg.PARAMETERS
 
 

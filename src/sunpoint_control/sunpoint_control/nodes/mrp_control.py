@@ -80,7 +80,8 @@ class MrpControl(Component):
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
-        sun = received["sun"]
+        sun, wheels = received["sun"], received["wheels"]
+        assert sun is not None and wheels is not None  # required inputs
         torques = np.zeros(len(self.values.wheels.axes))
         dipoles = np.zeros(len(self.values.rods.axes))
         self._state, output = control.step(
@@ -92,7 +93,7 @@ class MrpControl(Component):
             sun.eclipse,
             _vector(sun.omega_bn_b),
             sun.rate_source,
-            received["wheels"].speed,
+            wheels.speed,
             *self._field(stamp_ns, received),
             torques,
             dipoles,

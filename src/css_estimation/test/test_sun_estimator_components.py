@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The components that the estimator nodes host: messages in, messages out, without a running graph."""
+
+import math
+
+import numpy as np
+import pytest
+from sensor_msgs.msg import Imu
+
+from css_common.codec import codec_of
+from css_common.schema import checked_values, shaped_values
+from css_estimation.messages import gyro_reading
+from css_estimation.nodes.ekf import Ekf
+from css_estimation.nodes.wavg import Wavg
+from css_estimation.sun_heading import RATE_GYRO, RATE_SUN
+from css_msgs.msg import CssVoltages, SunEstimate
+
+KINDS = pytest.mark.parametrize("kind", [Wavg, Ekf])
+LIT = np.array([0.8, 0.7, 0.5, 0.55, 0.0, 0.0, 0.0, 0.0])
+OMEGA = np.array([0.01, 0.0, -0.02])
+
+
+def values_of(kind, **changes):
+    given = {name.replace("__", "."): value for name, value in changes.items()}
+    return shaped_values(kind.table(), checked_values(kind.table(), given))
+
+
+def build(kind, **changes):
+    return kind("sun", values_of(kind, **changes))
+
+
+def cells(stamp_ns, voltages=LIT):
+    return codec_of(CssVoltages).sample(stamp_ns, "bus", voltages=np.array(voltages, dtype=np.float64))
+
+
+def imu(stamp_ns, off=False):
+    covariance = np.zeros(9)
+    covariance[0] = -1.0 if off else 1e-8
+    return codec_of(Imu).sample(stamp_ns, "bus", angular_velocity=OMEGA.copy(), angular_velocity_covariance=covariance)
+
+
+def run(component, steps, start=0, off=False, voltages=LIT):
+    estimates = []
+    for k in range(start, start + steps):
+        stamp_ns = component.epoch_ns + k * component.period_ns
+        received = {"cells": cells(stamp_ns, voltages), "gyro": imu(stamp_ns, off)}
+        estimates.append(component.cycle(stamp_ns, received)["estimate"])
+    return estimates
+
+
+@KINDS
+def test_message_fits_its_type(kind):
+    codec = codec_of(SunEstimate)
+    for estimate in run(build(kind), 3):
+        again = codec.decode(codec.encode(estimate))
+        for field in codec.fields:
+            np.testing.assert_array_equal(getattr(again, field.name), getattr(estimate, field.name))
+    assert estimate.frame_id == "bus"
+
+
+@KINDS
+def test_topics(kind):
+    values = values_of(kind, cells__normals=[0.0, 0.0, 1.0])
+    voltages, gyro = kind.inputs("left", values)
+    assert (voltages.topic, voltages.lengths, voltages.required) == ("css/voltages", {"voltages": 1}, True)
+    assert (gyro.topic, gyro.required) == ("gyro/imu", False)
+    (output,) = kind.outputs("left", values)
+    assert output.topic == "left/sun_estimate"
+    assert output.ends_cycle
+
+
+@KINDS
+def test_a_gyro_that_says_off_and_a_silent_one_are_the_same(kind):
+    off, silent = build(kind), build(kind)
+    for k in range(20):
+        stamp_ns = off.epoch_ns + k * off.period_ns
+        voltages = LIT * (1.0 - 0.01 * k)
+        a = off.cycle(stamp_ns, {"cells": cells(stamp_ns, voltages), "gyro": imu(stamp_ns, off=True)})["estimate"]
+        b = silent.cycle(stamp_ns, {"cells": cells(stamp_ns, voltages), "gyro": None})["estimate"]
+        assert codec_of(SunEstimate).encode(a) == codec_of(SunEstimate).encode(b)
+    assert a.rate_source == RATE_SUN
+
+
+@KINDS
+def test_a_second_run_gives_the_same_bytes(kind):
+    codec = codec_of(SunEstimate)
+    first, second = run(build(kind), 50), run(build(kind), 50)
+    assert [codec.encode(e) for e in first] == [codec.encode(e) for e in second]
+
+
+@KINDS
+def test_gyro_use_changes_in_flight_without_losing_the_state(kind):
+    component = build(kind)
+    before = run(component, 100)[-1]
+    component.tune(values_of(kind, use_gyro=False))
+    after = run(component, 1, start=100)[0]
+    assert (before.rate_source, after.rate_source) == (RATE_GYRO, RATE_SUN)
+    assert np.linalg.norm(after.omega_bn_b - before.omega_bn_b) < 0.07 * np.linalg.norm(OMEGA)
+    np.testing.assert_allclose(after.sun_b, before.sun_b, atol=5e-3)
+
+
+@KINDS
+def test_age_follows_the_stamps(kind):
+    component = build(kind)
+    run(component, 5)
+    late = run(component, 1, start=34, voltages=np.zeros(8))[0]
+    assert late.age == pytest.approx(3.0)
+
+
+@KINDS
+@pytest.mark.parametrize(("source", "expected"), [("sensors", 0), ("model", 1), ("both", 0)])
+def test_eclipse_by_the_orbit_model(kind, source, expected):
+    """The default orbit starts under the Sun: 45 min later the model has it in shadow, while the cells say lit."""
+    component = build(kind, eclipse__source=source)
+    assert run(component, 1, start=600)[0].eclipse == 0
+    assert run(component, 1, start=27_000)[0].eclipse == expected
+
+
+def test_imu_convention():
+    assert gyro_reading(None) == ((0.0, 0.0, 0.0), False)
+    assert gyro_reading(imu(0, off=True)) == ((0.0, 0.0, 0.0), False)
+    rate, valid = gyro_reading(imu(0))
+    assert valid
+    assert rate == tuple(OMEGA.tolist())
+    assert all(math.isfinite(w) for w in rate)
