@@ -170,6 +170,7 @@ class PlantNode(ComponentNode):
     def _go_to(self, stamp_ns: int, outgoing: Outgoing) -> None:
         self._stamp = self._last_stamp = stamp_ns
         self._answers.clear()
+        self._warned.clear()
         self._waiting_since = time.monotonic()
         self.counters["cycles"] += 1
         try:
@@ -278,7 +279,6 @@ class PlantNode(ComponentNode):
             )
             self._lost.update(missing)
             self.counters["partners_lost"] += len(missing)
-            self._warned.clear()
             self._advance()
         elif not self._warned.issuperset(missing):
             self._warned.update(missing)

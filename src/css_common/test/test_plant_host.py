@@ -43,7 +43,7 @@ def command(step: int, torque: float = 0.0):
 
 def test_every_step_is_answered_with_its_own_stamp(bench, mission):
     voltages = bench.listen("voltages", CssVoltages)
-    nodes = fly(bench, mission("mission.duration=5", "lockstep.recorders=1"))
+    nodes = fly(bench, mission("mission.duration=5"))
     plant, estimator = nodes["source"], nodes["estimator"]
     bench.until(lambda: len(voltages) == 50, "all voltages")
     assert [v.stamp_ns for v in voltages] == [T0 + k * STEP for k in range(50)]
