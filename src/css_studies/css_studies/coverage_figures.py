@@ -2,6 +2,7 @@
 """Coverage maps as PNG files (O'Keefe & Schaub 2013, Figs. 1b and 2)."""
 
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -83,7 +84,7 @@ def _write_errors(result: CellMap, cells: np.ndarray, title: str, subject: str, 
         return save(figure, path)
 
 
-def _draw_map(axes: Axes, values: np.ndarray, **style_of_image: object) -> AxesImage:
+def _draw_map(axes: Axes, values: np.ndarray, **style_of_image: Any) -> AxesImage:
     image = axes.imshow(
         values, extent=(0.0, 360.0, 180.0, 0.0), aspect="auto", interpolation="nearest", **style_of_image
     )

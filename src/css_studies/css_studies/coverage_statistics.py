@@ -96,9 +96,9 @@ def wavg_errors(grid: Grid, result: CellMap) -> WavgErrors:
         mean_deg=float((filled * weight).sum() / weight.sum()) if known.any() else None,
         max_deg=float(filled.max()),
         fraction_above_30=float(grid.ring_weight @ large.mean(axis=1)),
-        polar_max_above_30=extent(large.any(axis=1)),
+        polar_max_above_30=extent(np.any(large, axis=1)),
         polar_mean_above_30=extent(ring_mean > LARGE_ERROR_DEG),
-        polar_all_above_30=extent(large.all(axis=1)),
+        polar_all_above_30=extent(np.all(large, axis=1)),
         max_within_deg={cone: float(filled[chosen].max()) for cone, chosen in within.items()},
         first_polar_above_10=float(above_small[0]) if len(above_small) else None,
     )

@@ -28,7 +28,7 @@ def rate_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
     rows, steps = log.truth_rows(estimates)
     known = estimates.rate_source[rows] != SunEstimate.RATE_NONE
     rows, steps = rows[known], steps[known]
-    return steps, np.linalg.norm(estimates.omega_bn_b[rows] - log.truth.omega_bn_b[steps], axis=1)
+    return steps, np.linalg.norm(estimates.omega_bn_b[rows] - log.having("truth").omega_bn_b[steps], axis=1)
 
 
 def tangent_nees(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:

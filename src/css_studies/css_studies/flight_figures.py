@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of one flight or several, as PNG files."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
@@ -73,7 +73,7 @@ def _write_comparison(logs: Sequence[FlightLog], labels: Sequence[str], folder: 
     if len(shown) < 2:
         return []
     folder.mkdir(parents=True, exist_ok=True)
-    longest = max((log for log, _ in shown), key=lambda log: len(log.truth) * log.period)
+    longest = max((log for log, _ in shown), key=lambda log: len(log.sunlit) * log.period)
     unit = time_axis(longest)
     with style():
         figure = new_figure(_WIDTH, 7.0)
@@ -99,10 +99,11 @@ def _write_comparison(logs: Sequence[FlightLog], labels: Sequence[str], folder: 
         return [save(figure, folder / "comparison.png")]
 
 
-def _finish_time(all_axes: Sequence[Axes], unit: TimeAxis) -> None:
+def _finish_time(all_axes: Iterable[Axes], unit: TimeAxis) -> None:
+    *_, last = all_axes
     if unit.last > unit.first:
-        all_axes[-1].set_xlim(unit.first, unit.last)
-    all_axes[-1].set_xlabel(unit.label)
+        last.set_xlim(unit.first, unit.last)
+    last.set_xlabel(unit.label)
 
 
 def _annotate(axes: Axes, text: str) -> None:

@@ -127,6 +127,17 @@ class FlightLog:
             return self.mission.epoch_ns
         return min((int(columns.stamp_ns[0]) for columns in self.columns()), default=0)
 
+    def having(self, topic: str) -> Columns:
+        """The columns called `topic` (`truth`, `wheels`, ...), where the log must have them.
+
+        Raises:
+            ValueError: it has none.
+        """
+        columns = getattr(self, topic)
+        if columns is None:
+            raise ValueError(f"{self.origin}: the flight has no {topic}")
+        return columns
+
     def time(self, columns: Columns) -> np.ndarray:
         """Time [s] of each row since the epoch."""
         return (columns.stamp_ns - self.epoch_ns) * 1e-9
@@ -169,13 +180,13 @@ class FlightLog:
     @cached_property
     def sun_b(self) -> np.ndarray:
         """(M, 3) true direction to the Sun in b at every step of the truth."""
-        truth = self._required_truth()
+        truth = self.having("truth")
         return to_body(truth.sigma_bn, truth.sun_n)
 
     @cached_property
     def sunlit(self) -> np.ndarray:
         """(M,) True at steps of the truth with more than half of the solar disc in view."""
-        return self._required_truth().illumination > SUNLIT_FRACTION
+        return self.having("truth").illumination > SUNLIT_FRACTION
 
     @cached_property
     def pointing_error(self) -> np.ndarray:
@@ -185,7 +196,7 @@ class FlightLog:
     @cached_property
     def rate(self) -> np.ndarray:
         """(M,) norm of the true body rate [rad/s]."""
-        return np.linalg.norm(self._required_truth().omega_bn_b, axis=1)
+        return np.linalg.norm(self.having("truth").omega_bn_b, axis=1)
 
     def truth_rows(self, columns: Columns) -> tuple[np.ndarray, np.ndarray]:
         """Pairs of rows that belong to one instant: rows of `columns`, rows of the truth.
@@ -193,18 +204,13 @@ class FlightLog:
         Stamps of one flight agree exactly; those of devices with own clocks belong to the nearest step of the
         truth within half a period.
         """
-        stamps = self._required_truth().stamp_ns
+        stamps = self.having("truth").stamp_ns
         after = np.clip(np.searchsorted(stamps, columns.stamp_ns), 0, len(stamps) - 1)
         before = np.maximum(after - 1, 0)
         nearer = np.abs(stamps[after] - columns.stamp_ns) <= np.abs(stamps[before] - columns.stamp_ns)
         rows = np.where(nearer, after, before)
         near = np.abs(stamps[rows] - columns.stamp_ns) <= 0.5e9 * self.period
         return np.flatnonzero(near), rows[near]
-
-    def _required_truth(self) -> Columns:
-        if self.truth is None:
-            raise ValueError(f"{self.origin}: the flight has no truth")
-        return self.truth
 
 
 def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> FlightLog:

@@ -150,7 +150,8 @@ def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
 
 def _span(log: FlightLog, first: int, last: int) -> float:
     """Time [s] from one step of the truth to another."""
-    return float(log.truth.stamp_ns[last] - log.truth.stamp_ns[first]) * 1e-9
+    stamps = log.having("truth").stamp_ns
+    return float(stamps[last] - stamps[first]) * 1e-9
 
 
 def _mean_deg(angles: np.ndarray) -> float | None:

@@ -73,7 +73,7 @@ def draw_heading_error(
     """Angle of estimated to true Sun; a stretch of steps without estimate is a gap in the line."""
     steps, errors = heading_errors(log, name)
     degrees = np.maximum(np.degrees(errors), _LEAST_ERROR)
-    time = log.time(log.truth)[steps] / unit.scale
+    time = log.time(log.having("truth"))[steps] / unit.scale
     spacing = np.diff(steps, prepend=steps[:1])
     gaps = np.flatnonzero(spacing > 3 * max(np.median(spacing), 1)) if len(steps) else steps
     draw_series(axes, np.insert(time, gaps, np.nan), np.insert(degrees, gaps, np.nan), colour, label)
@@ -81,12 +81,14 @@ def draw_heading_error(
 
 def draw_pointing_error(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str = "") -> None:
     """Angle of array normal to true Sun."""
-    draw_series(axes, log.time(log.truth) / unit.scale, np.degrees(log.pointing_error), colour, label)
+    draw_series(
+        axes, log.time(log.having("truth")) / unit.scale, np.degrees(log.pointing_error), colour, label
+    )
 
 
 def draw_true_rate(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str) -> None:
     """Norm of the true body rate."""
-    draw_series(axes, log.time(log.truth) / unit.scale, np.degrees(log.rate), colour, label)
+    draw_series(axes, log.time(log.having("truth")) / unit.scale, np.degrees(log.rate), colour, label)
 
 
 def finish_heading_error(axes: Axes) -> None:
@@ -135,14 +137,16 @@ def _body_rate(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
 
 
 def _wheel_speed(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
-    _draw_all(axes, log, unit, log.wheels, log.wheels.speed * _RPM)
+    wheels = log.having("wheels")
+    _draw_all(axes, log, unit, wheels, wheels.speed * _RPM)
     axes.set_ylabel("speed [rpm]")
     legend(axes, title="wheel")
 
 
 def _cell_output(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
-    outputs = log.voltages.voltages
-    _draw_all(axes, log, unit, log.voltages, outputs)
+    cells = log.having("voltages")
+    outputs = cells.voltages
+    _draw_all(axes, log, unit, cells, outputs)
     axes.set_ylim(bottom=min(0.0, float(np.nanmin(outputs))))
     axes.set_ylabel("output [-]")
     legend(axes, title="cell")
@@ -155,11 +159,12 @@ def _draw_all(axes: Axes, log: FlightLog, unit: TimeAxis, columns: Columns, valu
 
 
 def _control_mode(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
-    modes = log.control.mode
+    control = log.having("control")
+    modes = control.mode
     # only the corners of the staircase are drawn
     turns = np.flatnonzero(np.diff(modes)) + 1
     corners = np.unique(np.concatenate(([0], turns - 1, turns, [len(modes) - 1])))
-    axes.step(log.time(log.control)[corners] / unit.scale, modes[corners], where="post", color=BLUE)
+    axes.step(log.time(control)[corners] / unit.scale, modes[corners], where="post", color=BLUE)
     axes.set_yticks(list(_MODES), list(_MODES.values()))
     axes.set_ylim(-0.5, len(_MODES) - 0.5)
 
