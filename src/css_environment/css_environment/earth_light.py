@@ -26,8 +26,8 @@ PATCHES = 32
 # from nadir outward and around: the division that gave the least error with 32 patches.
 _SECTORS = (5, 11, 16)
 _RING_ENDS = (0.17, 0.56, 1.0)
-_OUTWARD = (4, 4, 5)
-_AROUND = (6, 4, 4)
+_OUTWARD = (6, 6, 8)
+_AROUND = (8, 6, 5)
 
 _CIRCLES = sum(_OUTWARD)
 _SAMPLES = sum(s * o * a for s, o, a in zip(_SECTORS, _OUTWARD, _AROUND, strict=True))
@@ -50,13 +50,13 @@ class EarthView(NamedTuple):
     circles: np.ndarray  # (2, circles) sine and cosine of the angle from nadir of each circle of samples
     light: np.ndarray  # (samples,) light of each sample at a reflectivity of one
     cell: np.ndarray  # (samples,) its cell in the reflectivity grid
-    disc: np.ndarray  # (2,) cosine and sine of the angular radius of the Earth
+    disc: np.ndarray  # (3,) cosine and sine of the angular radius of the Earth; 1 if any of it is sunlit, else 0
 
 
 def new_earth_view() -> EarthView:
     """Room for `look_at_earth`."""
     return EarthView(
-        np.zeros((3, 3)), np.zeros((2, _CIRCLES)), np.zeros(_SAMPLES), np.zeros(_SAMPLES, np.int32), np.zeros(2)
+        np.zeros((3, 3)), np.zeros((2, _CIRCLES)), np.zeros(_SAMPLES), np.zeros(_SAMPLES, np.int32), np.zeros(3)
     )
 
 
@@ -113,6 +113,11 @@ def look_at_earth(
         view.frame[0, i], view.frame[1, i], view.frame[2, i] = x[i], y[i], up[i]
     up_e, x_e, y_e = multiply(dcm_en, up), multiply(dcm_en, x), multiply(dcm_en, y)
     sun_up, sun_x = dot(sun_n, up), dot(sun_n, x)
+    # The terminator lies 90 deg from the point below the Sun, the horizon at the arc cosine of `ratio` from the
+    # point below the spacecraft.
+    view.disc[2] = 1.0 if sun_up > -disc_cos else 0.0
+    if view.disc[2] == 0.0:
+        return
 
     sample, circle, azimuth, end = 0, 0, 0, 0.0
     for ring in range(len(_SECTORS)):
@@ -153,8 +158,14 @@ def look_at_earth(
 @kernel
 def gather_light(view: EarthView, reflectivity, light) -> None:
     """Second half of `albedo_sources`: samples, weighed with the reflectivities of one case, summed to patches."""
-    columns = reflectivity.shape[1]
+    values = reflectivity.ravel()
     total = 0.0
+    for i in range(3):
+        light[DISC + i] = -view.frame[2, i]
+    light[DISC + DISC_COS], light[DISC + DISC_SIN] = view.disc[0], view.disc[1]
+    if view.disc[2] == 0.0:
+        light[DISC + DISC_LIGHT] = 0.0
+        return
     patch, first_sample, first_circle, first_azimuth = 0, 0, 0, 0
     for ring in range(len(_SECTORS)):
         around, outward = _AROUND[ring], _OUTWARD[ring]
@@ -166,8 +177,7 @@ def gather_light(view: EarthView, reflectivity, light) -> None:
                 for a in range(sector * around, (sector + 1) * around):
                     sample = first_sample + k * points + a
                     if view.light[sample] > 0.0:
-                        cell = view.cell[sample]
-                        w = view.light[sample] * reflectivity[cell // columns, cell % columns]
+                        w = view.light[sample] * values[view.cell[sample]]
                         sum_light += w
                         sum_x += w * sine * _COS_AZIMUTH[first_azimuth + a]
                         sum_y += w * sine * _SIN_AZIMUTH[first_azimuth + a]
@@ -178,9 +188,7 @@ def gather_light(view: EarthView, reflectivity, light) -> None:
         first_sample += outward * points
         first_circle += outward
         first_azimuth += points
-    for i in range(3):
-        light[DISC + i] = -view.frame[2, i]
-    light[DISC + DISC_COS], light[DISC + DISC_SIN], light[DISC + DISC_LIGHT] = view.disc[0], view.disc[1], total
+    light[DISC + DISC_LIGHT] = total
 
 
 @kernel

@@ -113,11 +113,22 @@ def draw_reflectivity(reflectivity: Reflectivity, key: RandomKey, common: bool, 
 def cell_at(x: float, y: float, z: float, rows: int, columns: int) -> int:
     """Number (row * columns + column) of the grid cell in the Earth-fixed direction (x, y, z), a unit vector.
 
-    Latitude is geocentric.
+    Latitude is geocentric. Latitude and longitude are good to 1e-5 rad.
     """
-    row = int((math.asin(max(-1.0, min(1.0, z))) / math.pi + 0.5) * rows)
-    cell = min(max(row, 0), rows - 1) * columns
-    if columns > 1:
-        column = int((math.atan2(y, x) / (2.0 * math.pi) + 0.5) * columns)
-        cell += min(max(column, 0), columns - 1)
-    return cell
+    row = int((_arc(math.sqrt(x * x + y * y), z) / math.pi + 0.5) * rows)
+    column = int((_arc(x, y) / (2.0 * math.pi) + 0.5) * columns)
+    return min(max(row, 0), rows - 1) * columns + min(max(column, 0), columns - 1)
+
+
+@kernel
+def _arc(x: float, y: float) -> float:
+    """Angle of (x, y) from the x axis to 1e-5 rad, three times faster than atan2 (Abramowitz & Stegun, 4.4.49)."""
+    short, long = min(abs(x), abs(y)), max(abs(x), abs(y), 1e-300)
+    q = short / long
+    q2 = q * q
+    angle = q * (0.9998660 + q2 * (-0.3302995 + q2 * (0.1801410 + q2 * (-0.0851330 + q2 * 0.0208351))))
+    if abs(y) > abs(x):
+        angle = 0.5 * math.pi - angle
+    if x < 0.0:
+        angle = math.pi - angle
+    return -angle if y < 0.0 else angle

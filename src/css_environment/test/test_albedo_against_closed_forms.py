@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Albedo against closed forms of a Lambert sphere, its symmetries, and the figures of the paper."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from css_environment.albedo import Screen, albedo_output, collar_screen, new_workspace, plane_screen, transmission
+from css_environment.constants import EARTH_RADIUS
+from css_environment.earth_light import (
+    DISC,
+    DISC_LIGHT,
+    albedo_sources,
+    gather_light,
+    look_at_earth,
+    new_earth_view,
+    new_light,
+)
+from css_environment.ephemeris import at, build_ephemeris
+from css_environment.orbit import keplerian_orbit, orbit_period
+from css_environment.reflectivity import zonal_reflectivity
+
+CELL = np.dtype([(name, float) for name in ("nx", "ny", "nz", "side")], align=True)
+IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NO_SCREEN = plane_screen((0.0, 0.0, 0.0))
+WHITE = np.ones((1, 1))
+EPOCH_NS = 1_370_044_800 * 10**9
+
+
+def cells_of(normals, sides=0.0):
+    cells = np.zeros(len(normals), CELL)
+    cells["nx"], cells["ny"], cells["nz"] = np.transpose(normals)
+    cells["side"] = sides
+    return cells
+
+
+def light_from(r_n, sun_n, reflectivity=WHITE, flux=1.0):
+    light = new_light()
+    albedo_sources(new_earth_view(), tuple(r_n), tuple(sun_n), flux, IDENTITY, reflectivity, light)
+    return light
+
+
+def output(light, normals, sides=0.0, screen=NO_SCREEN, cos_half_view=0.0, dcm_bn=IDENTITY):
+    result = np.full(len(normals), np.nan)
+    albedo_output(light, cells_of(normals, sides), screen, cos_half_view, dcm_bn, new_workspace(), result)
+    return result
+
+
+def sun_at(zenith_angle_deg):
+    a = math.radians(zenith_angle_deg)
+    return (math.sin(a), 0.0, math.cos(a))
+
+
+@pytest.mark.parametrize("altitude", [300e3, 475e3, 1000e3])
+@pytest.mark.parametrize("zenith_angle", [0.0, 30.0, 60.0])
+def test_plate_facing_a_fully_lit_earth(altitude, zenith_angle):
+    """With all of the disc lit, only the vertical part of n_A counts: one integral over the angle of emission."""
+    r = EARTH_RADIUS + altitude
+    k = EARTH_RADIUS / r
+    assert zenith_angle < 90.0 - math.degrees(math.acos(k))
+    integral, _ = quad(lambda m: 2 * k * k * m * (m * math.sqrt(1 - k * k * (1 - m * m)) + k * (1 - m * m)), 0, 1)
+    light = light_from((0.0, 0.0, r), sun_at(zenith_angle))
+    expected = math.cos(math.radians(zenith_angle)) * integral
+    assert output(light, [[0.0, 0.0, -1.0]])[0] == pytest.approx(expected, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("zenith_angle", "magnitude"), [(0, 0.862), (30, 0.747), (60, 0.433), (68, 0.326), (75, 0.228)]
+)
+def test_vector_sum_of_the_light(zenith_angle, magnitude):
+    """Irradiance vector over a white Earth at 475 km; opposite plates differ by its component."""
+    light = light_from((0.0, 0.0, EARTH_RADIUS + 475e3), sun_at(zenith_angle))
+    plates = output(light, np.vstack((np.eye(3), -np.eye(3))))
+    assert np.linalg.norm(plates[:3] - plates[3:]) == pytest.approx(magnitude, abs=2e-3)
+
+
+@pytest.mark.parametrize("phase_deg", [0.0, 45.0, 90.0, 135.0])
+def test_from_far_away_the_earth_is_a_lambert_sphere(phase_deg):
+    """Phase function (sin p + (pi - p) cos p) / pi and geometric albedo 2/3 (Russell 1916)."""
+    distance = 300.0 * EARTH_RADIUS
+    p = math.radians(phase_deg)
+    light = light_from((0.0, 0.0, distance), sun_at(phase_deg))
+    expected = 2.0 / 3.0 * (EARTH_RADIUS / distance) ** 2 * (math.sin(p) + (math.pi - p) * math.cos(p)) / math.pi
+    assert output(light, [[0.0, 0.0, -1.0]])[0] == pytest.approx(expected, rel=0.01)
+
+
+def test_no_light_where_no_sunlit_earth_is_in_view():
+    r = EARTH_RADIUS + 400e3
+    beyond = 90.0 + math.degrees(math.acos(EARTH_RADIUS / r))
+    before, after = light_from((0, 0, r), sun_at(beyond - 3.0)), light_from((0, 0, r), sun_at(beyond + 0.01))
+    assert before[DISC + DISC_LIGHT] > 0.0
+    assert after[DISC + DISC_LIGHT] == 0.0
+    assert np.all(output(after, np.vstack((np.eye(3), -np.eye(3)))) == 0.0)
+
+
+def test_light_vanishes_gently_at_the_end_of_twilight():
+    r = EARTH_RADIUS + 400e3
+    totals = [float(light_from((0, 0, r), sun_at(a))[DISC + DISC_LIGHT]) for a in np.arange(60.0, 115.0, 0.25)]
+    assert np.all(np.diff(totals) <= 0.0)
+    assert totals[-1] == 0.0
+
+
+def test_output_is_proportional_to_flux_and_reflectivity():
+    r = (0.0, 0.0, EARTH_RADIUS + 400e3)
+    normals = [[0.0, 0.0, -1.0], [0.6, 0.0, -0.8], [1.0, 0.0, 0.0]]
+    white = output(light_from(r, sun_at(40.0)), normals)
+    np.testing.assert_allclose(
+        output(light_from(r, sun_at(40.0), 0.3 * WHITE, 1.03), normals), 0.309 * white, rtol=1e-5
+    )
+
+
+def test_shared_view_gives_each_case_its_own_light():
+    r, sun = (1e6, 2e6, 6.5e6), sun_at(30.0)
+    grid = zonal_reflectivity().mean
+    view, light = new_earth_view(), new_light()
+    look_at_earth(view, r, sun, 1.0, IDENTITY, *grid.shape)
+    for reflectivity in (grid, 0.5 * grid):
+        gather_light(view, reflectivity, light)
+        np.testing.assert_array_equal(light, light_from(r, sun, reflectivity))
+
+
+@pytest.mark.parametrize("position", [(0.0, 0.0, 0.0), (1e6, 0.0, 0.0), (EARTH_RADIUS, 0.0, 0.0), (1e12, 0.0, 0.0)])
+@pytest.mark.parametrize("sun", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)])
+def test_places_inside_the_earth_and_far_away_give_finite_light(position, sun):
+    light = light_from(position, sun)
+    assert np.all(np.isfinite(light))
+    result = output(light, np.vstack((np.eye(3), -np.eye(3))), 1.0, plane_screen((0, 0, 1)), 0.5)
+    assert np.all(np.isfinite(result)) and np.all(result >= 0.0)
+
+
+def test_plane_sends_each_ray_to_one_side():
+    """Two cells with one normal on opposite sides of the plane share what a free cell receives."""
+    rng = np.random.default_rng(4)
+    light = light_from((0.0, 0.0, EARTH_RADIUS + 400e3), sun_at(50.0))
+    for _ in range(50):
+        dcm_bn = tuple(map(tuple, np.linalg.qr(rng.normal(size=(3, 3)))[0]))
+        normal = np.linalg.qr(rng.normal(size=(3, 3)))[0][:1]
+        shared = [output(light, normal, side, plane_screen((0, 0, 1)), 0.0, dcm_bn)[0] for side in (1.0, -1.0)]
+        assert sum(shared) == pytest.approx(output(light, normal, 0.0, NO_SCREEN, 0.0, dcm_bn)[0], abs=2e-3)
+
+
+def test_cone_of_view_hides_an_earth_behind_the_cell():
+    light = light_from((0.0, 0.0, EARTH_RADIUS + 400e3), sun_at(0.0))
+    disc = math.degrees(math.asin(EARTH_RADIUS / (EARTH_RADIUS + 400e3)))
+    for angle, sees in ((disc + 59.0, True), (disc + 61.0, False)):
+        a = math.radians(angle)
+        value = output(light, [[math.sin(a), 0.0, -math.cos(a)]], cos_half_view=0.5)[0]
+        assert (value > 0.0) == sees
+
+
+def test_what_a_screen_passes_of_a_point_source():
+    plane = plane_screen((0.0, 0.0, 1.0))
+    up, down = (0.6, 0.0, 0.8), (0.6, 0.0, -0.8)
+    assert [transmission(plane, side, up) for side in (1.0, -1.0, 0.0)] == [1.0, 0.0, 1.0]
+    assert [transmission(plane, side, down) for side in (1.0, -1.0, 0.0)] == [0.0, 1.0, 1.0]
+    assert transmission(NO_SCREEN, 1.0, down) == 1.0
+    collar = collar_screen((0.0, 0.0, 1.0), math.radians(28.0), math.radians(44.9))
+    assert transmission(collar, 1.0, (math.sin(0.48), 0.0, math.cos(0.48))) == 1.0
+    assert transmission(collar, 1.0, (math.sin(0.79), 0.0, math.cos(0.79))) == 0.0
+    middle = 0.5 * (collar.full_cos + collar.dark_cos)
+    assert transmission(collar, 1.0, (math.sqrt(1 - middle**2), 0.0, middle)) == pytest.approx(0.5)
+    assert Screen((0.0, 0.0, 1.0), 0.0, 0.0) == plane
+
+
+@pytest.mark.parametrize(("inclination", "lowest", "highest"), [(45.0, 0.20, 0.30), (90.0, 0.33, 0.38)])
+def test_largest_output_along_the_papers_orbits(inclination, lowest, highest):
+    """O'Keefe & Schaub 2013, Fig. 5: albedo reaches about 25 % of the Sun at 45 deg, more over the poles."""
+    azimuths = np.radians([0, 90, 180, 270])
+    normals = np.array([[np.cos(a), np.sin(a), z] for z in (1, -1) for a in azimuths]) / math.sqrt(2.0)
+    orbit = keplerian_orbit(EARTH_RADIUS + 400e3, 0.0, inclination, 60.0)
+    ephemeris = build_ephemeris(orbit, EPOCH_NS, field=False)
+    reflectivity = zonal_reflectivity(1).mean
+    view, light, work, result = new_earth_view(), new_light(), new_workspace(), np.zeros(8)
+    cells, plane = cells_of(normals, normals[:, 2]), plane_screen((0, 0, 1))
+    rng = np.random.default_rng(8)
+    attitudes = [tuple(map(tuple, np.linalg.qr(rng.normal(size=(3, 3)))[0])) for _ in range(150)]
+    peak = 0.0
+    for t in np.arange(0.0, orbit_period(orbit), 60.0):
+        state = at(ephemeris, float(t))
+        albedo_sources(view, state.r_n, state.sun_n, state.solar_flux, state.dcm_en, reflectivity, light)
+        for dcm_bn in attitudes:
+            albedo_output(light, cells, plane, 0.5, dcm_bn, work, result)
+            peak = max(peak, result.max())
+    assert lowest < peak < highest
