@@ -10,6 +10,7 @@ builds its wait set anew, which is what costs rclpy most of its time.
 import os
 from collections.abc import Callable, Iterable
 
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
@@ -78,10 +79,15 @@ def spin_until(
     while True:
         if not context.ok():
             raise ExternalShutdownException
-        for _ in range(_CALLBACKS_BETWEEN_CHECKS):
-            if done():
-                return
-            spin_once(timeout_sec=interval)
+        try:
+            for _ in range(_CALLBACKS_BETWEEN_CHECKS):
+                if done():
+                    return
+                spin_once(timeout_sec=interval)
+        except RCLError:
+            # what a shutdown in the middle of a wait looks like from inside
+            if context.ok():
+                raise
 
 
 def add_nodes(executor: Executor, nodes: Iterable[Node]) -> None:
