@@ -45,7 +45,8 @@ def as_tuples(matrix):
 
 
 def rotation(rng):
-    return np.linalg.qr(rng.normal(size=(3, 3)))[0] * np.array([[1.0], [1.0], [1.0]])
+    """Random orthogonal matrix; reflections serve as well here."""
+    return np.linalg.qr(rng.normal(size=(3, 3)))[0]
 
 
 def cells_of(normals, sides):
