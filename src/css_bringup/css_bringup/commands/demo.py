@@ -70,7 +70,8 @@ def _run(arguments: argparse.Namespace) -> int:
     console.print("\nReplaying the recording through every Sun estimator, with gyro and without:")
     replayed = replay(bag, bag.with_name(f"{bag.name}_replay"), mission, map(parse_request, _REPLAYED), {})
     print_replay(replayed)
-    for file in write_figures([log, replayed.log], arguments.figures or bag.with_name(f"{bag.name}_figures")):
+    folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
+    for file in (*write_figures(log, folder), *write_figures(replayed.log, folder / "replay")):
         console.print(f"figure: {file}", soft_wrap=True)
     runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
     if arguments.json:
