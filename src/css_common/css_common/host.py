@@ -13,11 +13,13 @@ from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.parameter import Parameter as RosParameter
+from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from css_common import ros_parameters, sections
@@ -30,6 +32,10 @@ from css_common.schema import ParameterError, Values, shaped_values
 
 _SUCCESS = TransitionCallbackReturn.SUCCESS
 _FAILURE = TransitionCallbackReturn.FAILURE
+# Durability too: drivers publish volatile, which a subscription to a topic of the loop would never match.
+_OVERRIDES = QoSOverridingOptions(
+    (QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH, QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY)
+)
 
 
 def rehearse(component_type: type[Component], name: str, values: Values) -> None:
@@ -190,7 +196,7 @@ class ComponentNode(LifecycleNode):
             output.message_type,
             output.topic,
             LOOP_PUBLISHER,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            qos_overriding_options=_OVERRIDES,
         )
         codec = codec_of(output.message_type)
         return publisher, codec, codec.real_fields(), output.topic
@@ -203,7 +209,7 @@ class ComponentNode(LifecycleNode):
                 callback,
                 LOOP_SUBSCRIPTION,
                 raw=True,
-                qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+                qos_overriding_options=_OVERRIDES,
             )
         )
 
@@ -239,8 +245,12 @@ class ComponentNode(LifecycleNode):
     def finish(self, seconds: float = 2.0) -> None:
         """Waits until listeners have what was published, so that a message is not lost with its sender."""
         timeout = Duration(seconds=seconds)
-        for publisher, *_ in self._output_ports.values():
-            publisher.wait_for_all_acked(timeout)
+        try:
+            for publisher, *_ in self._output_ports.values():
+                publisher.wait_for_all_acked(timeout)
+        except RCLError:
+            if self.context.ok():  # else a signal has ended all traffic already
+                raise
 
     def _mark_begin(self) -> None:
         self._began = (time.perf_counter(), time.process_time())

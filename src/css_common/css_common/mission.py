@@ -87,7 +87,7 @@ class Mission:
         """
         self.origin = origin
         self.parameters = parameters
-        shared = dict(parameters.get(SHARED, {}))
+        shared = {key: value for key, value in parameters.get(SHARED, {}).items() if not belongs_to_ros(key)}
         self._events_raw = _take(shared, "events.")
         self._criteria_raw = _take(shared, "criteria.")
         with _naming(origin, SHARED):
@@ -231,7 +231,8 @@ class Mission:
         table = component.table()
         names = {p.name for p in table}
         given = {key: value for key, value in self._shared_given.items() if key in names}
-        given |= self.parameters.get(name, {})
+        own = self.parameters.get(name, {})
+        given |= {key: value for key, value in own.items() if not belongs_to_ros(key)}
         with _naming(self.origin, name):
             canonical = checked_values(table, given)
             values = shaped_values(table, canonical)
@@ -309,7 +310,8 @@ class Mission:
             for entry in node.inputs:
                 if entry.topic in publishers:
                     self._check_connection(node, entry, *publishers[entry.topic])
-                elif entry.required:
+                elif entry.required and self.plant is not None:
+                    # without a plant nothing is simulated: devices publish what the nodes need
                     raise MissionError(
                         f"{self.origin}: {node.name} needs the topic {unknown_name(entry.topic, publishers)}; "
                         "no node of graph.nodes publishes it"
@@ -346,6 +348,11 @@ def _grouped(flat: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
         group, _, key = name.partition(".")
         groups.setdefault(group, {})[key] = value
     return groups
+
+
+def belongs_to_ros(name: str) -> bool:
+    """True for parameters that every ROS node has, whoever wrote it: quality-of-service overrides, simulated time."""
+    return name.startswith("qos_overrides.") or name in ("use_sim_time", "start_type_description_service")
 
 
 def parse_node_entry(entry: str, origin: str) -> tuple[str, str, str]:

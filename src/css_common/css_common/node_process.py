@@ -8,16 +8,17 @@ from itertools import pairwise
 from pathlib import Path
 
 import rclpy
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.executors import ExternalShutdownException
 
 from css_common.codec import type_name
 from css_common.component import Component, Plant
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
-from css_common.mission import Mission, mission_from_text
+from css_common.mission import Mission, belongs_to_ros, mission_from_text
 from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
 from css_common.plant_host import PlantNode
-from css_common.schema import ParameterError, default_values
+from css_common.schema import ParameterError, default_values, unknown_name
 from css_common.sections import GRAPH
 
 USAGE_ERROR = 2
@@ -64,6 +65,11 @@ def run_node(component_type: type[Component], arguments: list[str]) -> int:
     except (MissionError, ParameterError) as error:
         print(f"{executable}: {error}", file=sys.stderr)
         return USAGE_ERROR
+    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+        if node is not None:
+            raise
+        print(f"{executable}: {' '.join(str(error).split())}", file=sys.stderr)
+        return USAGE_ERROR
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
@@ -97,13 +103,26 @@ def mission_of_arguments(component_type: type[Component], arguments: list[str]) 
     name = executable
     for argument in arguments:
         name = argument.removeprefix("__node:=") if argument.startswith("__node:=") else name
+    _refuse_unknown_overrides(component_type, name, arguments)
     shared = parameters.setdefault("/**", {})
     if "graph.nodes" not in shared:
-        # a file for this node alone: the graph is the default one, with this node in it
+        # A file for this node alone: the graph is the default one, with this node in it. A node of another package
+        # knows nothing of that graph and stands by itself.
         nodes = default_values(GRAPH).graph.nodes
-        if not any(entry.partition(":")[2] or entry.rpartition("/")[2] == name for entry in nodes):
+        if not any(entry.startswith(f"{package}/") for entry in nodes):
+            nodes = []
+        if not any((entry.partition(":")[2] or entry.rpartition("/")[2]) == name for entry in nodes):
             shared["graph.nodes"] = [*nodes, f"{package}/{executable}:{name}"]
     return mission_from_text(dump_sections(parameters), ", ".join(files) or "defaults")
+
+
+def _refuse_unknown_overrides(component_type: type[Component], name: str, arguments: list[str]) -> None:
+    # ROS keeps an override that nobody declares without a word
+    known = [p.name for p in component_type.table()]
+    for option, assignment in pairwise(arguments):
+        node, _, key = assignment.partition(":=")[0].rpartition(":")
+        if option in ("-p", "--param") and node in ("", name) and key not in known and not belongs_to_ros(key):
+            raise ParameterError(unknown_name(key, known))
 
 
 def describe(component_type: type[Component]) -> str:

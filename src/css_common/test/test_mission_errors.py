@@ -190,6 +190,11 @@ def test_control_that_listens_to_an_estimator_that_does_not_fly():
     assert "controller needs the topic flat/sun_estimate: unknown" in message
 
 
+def test_without_a_plant_devices_publish_what_nodes_need():
+    text = HEAD.replace("testbed/source, testbed/gyro, ", "")
+    assert [n.name for n in mission_from_text(text, "bench.yaml").nodes] == ["estimator", "controller"]
+
+
 def test_awaited_topics_must_exist():
     message = refusal(shared("lockstep: {wait_for: [comand]}"))
     assert "bench.yaml: /**: lockstep.wait_for: comand: unknown; did you mean command?" in message

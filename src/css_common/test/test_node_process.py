@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The process of a node, started as `ros2 run` starts it: help, bad command lines, signals, ends."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from rclpy.qos import qos_profile_sensor_data
+
+from css_common import node_process
+from css_common.codec import codec_of
+from css_common.mission import find_component, mission_from_text
+from css_common.node_process import mission_of_arguments
+from css_common.schema import default_values
+from css_common.sections import GRAPH
+from css_common.testing import DEADLINE, Bench
+from css_msgs.msg import CssVoltages, SunEstimate
+
+PROGRAM = (
+    "import sys; from css_common import node_process; from css_common.mission import find_component;"
+    "sys.exit(node_process.main(find_component('testbed', sys.argv[1]), sys.argv[2:]))"
+)
+WORKSPACE = Path(__file__).parent / "workspace"
+
+
+class Process:
+    """A node in a process of its own."""
+
+    def __init__(self, name: str, *arguments: str, executor: str = "events") -> None:
+        paths = f"{WORKSPACE}{os.pathsep}{os.environ.get('PYTHONPATH', '')}"
+        self.popen = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, name, *arguments],
+            env=os.environ | {"PYTHONPATH": paths, "SUNPOINT_EXECUTOR": executor},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def end(self) -> tuple[int, str, str]:
+        """Exit code, output and error output, once it has ended."""
+        out, err = self.popen.communicate(timeout=DEADLINE)
+        return self.popen.returncode, out, err
+
+
+@pytest.fixture
+def start():
+    """Starts processes and leaves none behind."""
+    started: list[Process] = []
+
+    def start(name: str, *arguments: str, **options) -> Process:
+        started.append(Process(name, *arguments, **options))
+        return started[-1]
+
+    yield start
+    for process in started:
+        if process.popen.poll() is None:
+            process.popen.kill()
+            process.popen.communicate()
+
+
+@pytest.fixture
+def mission_file(tmp_path, mission_text):
+    """The small mission as a file."""
+    file = tmp_path / "bench.yaml"
+    file.write_text(mission_text.replace("testbed/gyro, ", ""), encoding="utf-8")
+    return str(file)
+
+
+@pytest.fixture
+def bench():
+    """One bench is enough here."""
+    with Bench() as bench:
+        yield bench
+
+
+def test_help_names_topics_and_parameters_and_starts_nothing(capsys):
+    assert node_process.main(find_component("testbed", "estimator"), ["--help"]) == 0
+    out = capsys.readouterr().out
+    for line in (
+        "ros2 run testbed estimator [--ros-args --params-file MISSION.yaml ...]",
+        "Puts gain times the first voltage into the age of its estimate",
+        "  voltages  css_msgs/msg/CssVoltages",
+        "  gyro/imu  sensor_msgs/msg/Imu  (optional)",
+        "  estimator/sun_estimate  css_msgs/msg/SunEstimate",
+        "  *gain = 1.0",
+        "factor of the voltage; a number written with a point, at least 0 and at most 10",
+        "   window = 4",
+    ):
+        assert line in out
+
+
+BAD = {
+    "value": (["-p", "gain:=11.0"], "estimator: gain: expected a number written with a point, at least 0"),
+    "assignment": (["-p", "gain=3.0"], "estimator: "),
+}
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_bad_command_lines_end_at_once_with_code_2(start, bad):
+    arguments, reason = BAD[bad]
+    code, out, err = start("estimator", "--ros-args", *arguments).end()
+    assert code == 2
+    assert reason in err
+    assert "Traceback" not in err
+    assert out == ""
+
+
+BAD_BEFORE_ROS = {
+    "name": (["-p", "gian:=1.0"], "estimator: gian: unknown; did you mean gain?\n"),
+    "name for this node": (["-p", "estimator:gian:=1.0"], "estimator: gian: unknown; did you mean gain?\n"),
+    "file": (["--params-file", "missing.yaml"], "estimator: missing.yaml: cannot be read: "),
+    "content": (["--params-file", "bad.yaml"], "estimator: bad.yaml: /**: io.deadlin: unknown; did you mean io.deadl"),
+}
+
+
+@pytest.mark.parametrize("bad", BAD_BEFORE_ROS)
+def test_what_the_mission_reader_refuses_ends_with_one_line_and_code_2(bad, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    Path("bad.yaml").write_text("/**: {ros__parameters: {io: {deadlin: 1.0}}}\n")
+    arguments, reason = BAD_BEFORE_ROS[bad]
+    interrupt = signal.getsignal(signal.SIGINT)
+    try:
+        assert node_process.main(find_component("testbed", "estimator"), ["--ros-args", *arguments]) == 2
+    finally:
+        signal.signal(signal.SIGINT, interrupt)
+    err = capsys.readouterr().err
+    assert err.startswith(reason)
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [["-p", "other:gian:=1.0"], ["-p", "use_sim_time:=true"], ["-p", "gain:=2.0"]])
+def test_overrides_for_others_and_of_ros_itself_are_let_through(arguments):
+    assert mission_of_arguments(find_component("testbed", "estimator"), ["--ros-args", *arguments]).nodes
+
+
+@pytest.mark.parametrize(
+    ("number", "executor"), [(signal.SIGINT, "events"), (signal.SIGTERM, "events"), (signal.SIGINT, "draining")]
+)
+def test_signals_end_a_node_cleanly(start, bench, mission_file, number, executor):
+    process = start("estimator", "--ros-args", "--params-file", mission_file, executor=executor)
+    bench.until(lambda: bench.node.count_publishers("estimator/sun_estimate") == 1, "the node is up")
+    process.popen.send_signal(number)
+    code, _, err = process.end()
+    assert code == 0
+    assert "Traceback" not in err
+
+
+def test_second_interrupt_does_not_tear_the_clean_up_apart(start, bench, mission_file):
+    process = start("estimator", "--ros-args", "--params-file", mission_file)
+    bench.until(lambda: bench.node.count_publishers("estimator/sun_estimate") == 1, "the node is up")
+    for _ in range(5):
+        process.popen.send_signal(signal.SIGINT)
+    code, _, err = process.end()
+    assert code == 0
+    assert "Traceback" not in err
+
+
+def test_three_processes_fly_a_mission(start, bench, mission_file, tmp_path):
+    estimates = bench.listen("estimator/sun_estimate", SunEstimate)
+    arguments = ("--ros-args", "--params-file", mission_file)
+    partners = [start(name, *arguments) for name in ("estimator", "controller")]
+    plant = start("source", "--summary", str(tmp_path / "summary.json"), *arguments)
+    bench.until(lambda: plant.popen.poll() is not None, "the plant ends by itself", seconds=2 * DEADLINE)
+    code, _, err = plant.end()
+    assert code == 0, err
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert summary["counters"]["cycles"] == 10
+    bench.until(lambda: len(estimates) == 10, "all estimates")
+    for partner in partners:
+        partner.popen.send_signal(signal.SIGINT)
+        assert partner.end()[0] == 0
+
+
+def test_plant_that_fails_ends_with_code_1(start):
+    code, _, err = start("source", "--ros-args", "-p", "fails_at:=2").end()
+    assert code == 1
+    assert "RuntimeError: the plant is out of order" in err
+
+
+def test_partners_that_never_come_end_the_plant_with_code_1(start, mission_file):
+    limits = ("-p", "lockstep.startup_limit:=0.2", "-p", "lockstep.warn_after:=0.1")
+    code, _, err = start("source", "--ros-args", "--params-file", mission_file, *limits).end()
+    assert code == 1
+    assert "after 0.2 s still absent: voltages has 0 of 1 listeners" in err
+
+
+REMAPPED = ("-r", "__node:=second", "-r", "voltages:=css/volts", "-r", "__ns:=/sat1")
+
+
+def test_remapped_topics_and_names_and_a_driver_that_publishes_volatile(start, bench):
+    qos = "qos_overrides./sat1/css/volts.subscription"
+    overrides = ("-p", f"{qos}.durability:=volatile", "-p", f"{qos}.reliability:=best_effort", "-p", "use_gyro:=false")
+    start("estimator", "--ros-args", *REMAPPED, *overrides)
+    driver = bench.node.create_publisher(CssVoltages, "/sat1/css/volts", qos_profile_sensor_data)
+    bench.until(lambda: driver.get_subscription_count() == 1, "the node listens to the driver")
+    assert ("second", "/sat1") in bench.node.get_node_names_and_namespaces()
+    heard = bench.listen("/sat1/second/sun_estimate", SunEstimate)
+    bench.until(lambda: bench.node.count_publishers("/sat1/second/sun_estimate") == 1, "the output carries its name")
+    codec = codec_of(CssVoltages)
+    steps = iter(range(1000))
+
+    def answered() -> bool:
+        # best effort: what was sent before the listener was ready is gone, so the driver keeps sending
+        sample = codec.sample(1_370_044_800_000_000_000 + next(steps) * 100_000_000, "bus", voltages=[1.0, 1.0])
+        driver.publish(codec.encode(sample))
+        return bool(heard)
+
+    bench.until(answered, "an estimate")
+
+
+def test_quality_of_service_overrides_may_stand_in_a_mission(mission_text):
+    qos = "{qos_overrides: {/voltages: {subscription: {durability: volatile}}}, use_sim_time: false}"
+    mission = mission_from_text(mission_text + f"estimator: {{ros__parameters: {qos}}}\n", "bench.yaml")
+    assert mission.parameters["estimator"]["qos_overrides./voltages.subscription.durability"] == "volatile"
+    assert mission_from_text(mission.text(), "again").parameters == mission.parameters
+
+
+def test_later_files_stand_over_earlier_ones(tmp_path):
+    first, second = tmp_path / "1.yaml", tmp_path / "2.yaml"
+    first.write_text(
+        "/**: {ros__parameters: {mission: {period: 0.5, case: 3}}}\nestimator: {ros__parameters: {gain: 2.0}}"
+    )
+    second.write_text("/**: {ros__parameters: {mission: {period: 0.25}}}")
+    arguments = ["--ros-args", "--params-file", str(first), "--params-file", str(second)]
+    mission = mission_of_arguments(find_component("testbed", "estimator"), arguments)
+    node = mission.node("estimator")
+    assert (mission.values.mission.period, mission.values.mission.case) == (0.25, 3)
+    assert node.values.gain == 2.0
+    assert mission.origin == f"{first}, {second}"
+
+
+def test_node_of_another_package_without_a_file_stands_by_itself():
+    component = find_component("testbed", "estimator")
+    mission = mission_of_arguments(component, [])
+    assert [n.name for n in mission.nodes] == ["estimator"]
+    mission = mission_of_arguments(component, ["--ros-args", "-r", "__node:=second"])
+    assert [n.name for n in mission.nodes] == ["second"]
+    assert mission.node("second").component is component
+
+
+def test_node_of_the_default_graph_without_a_file_has_that_graph_around_it():
+    graph = default_values(GRAPH).graph.nodes
+    package, _, executable = graph[0].partition("/")
+    component = find_component(package, executable)
+    assert len(mission_of_arguments(component, []).nodes) == len(graph)
+    second = mission_of_arguments(find_component("css_estimation", "ekf"), ["--ros-args", "-r", "__node:=second"])
+    assert [n.name for n in second.nodes][-1] == "second"
+    assert len(second.nodes) == len(graph) + 1
