@@ -7,15 +7,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from css_msgs.msg import CssVoltages, SunEstimate
 from flights import fly_composed, messages_by_topic, samples, short_mission
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from css_bringup.replay import parse_request
 from css_bringup.replaying import mission_of_bag, replay
+from css_common.codec import codec_of
 from css_common.mission_file import MissionError
+from css_msgs.msg import CssVoltages, SunEstimate
+from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
+from css_recording.bag_writer import BagWriter
 from css_recording.provenance import software_versions
 
 REFERENCE = Path(__file__).parents[1] / "bags" / "reference"
@@ -67,7 +70,9 @@ def test_another_parameter_is_another_estimate(flight, tmp_path):
     assert first != second
 
 
-@pytest.mark.parametrize("request_text", ["nonsense", "ekf:gyro=maybe", "ekf:gate", "ekf:no_such_key=1", "ekf:use_gyro=2"])
+@pytest.mark.parametrize(
+    "request_text", ["nonsense", "ekf:gyro=maybe", "ekf:gate", "ekf:no_such_key=1", "ekf:use_gyro=2"]
+)
 def test_what_cannot_be_replayed_is_refused_in_one_line(flight, tmp_path, request_text):
     with pytest.raises(MissionError) as caught:
         _replayed(flight, tmp_path / "replay", request_text)
@@ -78,7 +83,8 @@ def test_sqlite_recording_with_other_topic_names(flight, tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     definition = "std_msgs/Header header\nuint32 saturated\nfloat64[] voltages\n"
     store.register(get_types_from_msg(definition, "css_msgs/msg/CssVoltages"))
-    with BagReader(flight) as reader, Writer(tmp_path / "foreign", version=9, storage_plugin=StoragePlugin.SQLITE3) as out:
+    sqlite = Writer(tmp_path / "foreign", version=9, storage_plugin=StoragePlugin.SQLITE3)
+    with BagReader(flight) as reader, sqlite as out:
         connections = {
             "/css/voltages": out.add_connection("/obc/adc/sun", "css_msgs/msg/CssVoltages", typestore=store),
             "/gyro/imu": out.add_connection("/obc/imu", "sensor_msgs/msg/Imu", typestore=store),
@@ -98,10 +104,6 @@ def test_without_its_inputs_the_error_names_what_there_is(flight, tmp_path):
 
 
 def test_damaged_messages_are_counted_and_passed_over(flight, tmp_path):
-    from css_common.codec import codec_of
-    from css_recording.bag_metadata import Topic
-    from css_recording.bag_writer import BagWriter
-
     codec = codec_of(CssVoltages)
     with BagReader(flight) as reader, BagWriter(tmp_path / "damaged", metadata=reader.description) as writer:
         for entry in reader.topics:

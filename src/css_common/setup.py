@@ -25,6 +25,6 @@ setup(
     zip_safe=False,
     maintainer="Sunpoint maintainers",
     maintainer_email="maintainers@sunpoint.dev",
-    description="Attitude maths, random streams, missions, components and their host, shared by every Sunpoint package.",
+    description="Attitude maths, random streams, missions, components and their host.",
     license="Apache-2.0",
 )

@@ -25,6 +25,6 @@ setup(
     zip_safe=False,
     maintainer="Sunpoint maintainers",
     maintainer_email="maintainers@sunpoint.dev",
-    description="Orbit, Sun, Earth rotation, eclipse, magnetic field and albedo, for the simulated truth and for flight software alike.",
+    description="Orbit, Sun, Earth rotation, eclipse, magnetic field and albedo.",
     license="Apache-2.0",
 )

@@ -12,6 +12,7 @@ from css_bringup.flight import FlightResult, Progress
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
+from css_common.mission_file import MissionError
 from css_common.node_process import create_node
 from css_common.plant_host import PlantNode
 from css_recording.recorder import RecorderNode
@@ -29,30 +30,35 @@ class ComposedFlight:
         """Prepares a flight.
 
         Args:
-            mission: what to fly; it must have a plant.
+            mission: what to fly.
             bag: where to record; None records nothing.
             executor: kind of executor, see `create_executor`.
+
+        Raises:
+            MissionError: no node of the mission owns simulated time.
         """
+        if mission.plant is None:
+            raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
         self.mission = mission
         self.bag = bag
+        self._plant_name = mission.plant.name
         self.context = Context()
         self.nodes: dict[str, ComponentNode] = {}
         self.recorder: RecorderNode | None = None
         self._executor_kind = executor
 
     def __enter__(self) -> "ComposedFlight":
-        if self.mission.plant is None:
-            raise ValueError(f"{self.mission.name}: no node of graph.nodes owns simulated time")
         self.context.init()
         self.executor = create_executor(self._executor_kind, self.context)
-        options = {"context": self.context, "use_global_arguments": False}
         mission = self.mission
         if self.bag is not None:
             mission = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
-            self.recorder = RecorderNode(self.mission, self.bag, **options)
+            self.recorder = RecorderNode(self.mission, self.bag, context=self.context, use_global_arguments=False)
             self.executor.add_node(self.recorder)
         for node in mission.nodes:
-            self.nodes[node.name] = create_node(node.component, node.name, mission, **options)
+            self.nodes[node.name] = create_node(
+                node.component, node.name, mission, context=self.context, use_global_arguments=False
+            )
             self.executor.add_node(self.nodes[node.name])
         return self
 
@@ -68,7 +74,7 @@ class ComposedFlight:
     @property
     def plant(self) -> PlantNode:
         """The node that owns simulated time."""
-        node = self.nodes[self.mission.plant.name]
+        node = self.nodes[self._plant_name]
         assert isinstance(node, PlantNode)
         return node
 
@@ -107,18 +113,18 @@ class ComposedFlight:
         result.steps = flown_ns // self.mission.period_ns + 1
         result.simulated_s = result.steps * self.mission.period_ns * 1e-9
         if self.recorder is not None:
-            self._drain_recorder()
+            self._drain(self.recorder)
             self.recorder.close()
             topics = {f"/{topic}" for topic in self.mission.topics}
             result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
         if plant.counters["partners_lost"]:
             result.notes.append(f"{plant.counters['partners_lost']} partners fell silent")
 
-    def _drain_recorder(self) -> None:
+    def _drain(self, recorder: RecorderNode) -> None:
         # what was published last is still on its way: take until nothing more comes
         before = -1
-        while before != self.recorder.message_count:
-            before = self.recorder.message_count
+        while before != recorder.message_count:
+            before = recorder.message_count
             for _ in range(20):
                 self.executor.spin_once(timeout_sec=0.005)
 

@@ -49,17 +49,21 @@ class Child:
         """Exit code, or None while it runs."""
         return self.process.poll() if self.process else None
 
+    def interrupt(self) -> None:
+        """Asks the process to end, if it runs."""
+        if self.process is not None and self.process.poll() is None:
+            self.process.send_signal(signal.SIGINT)
+
     def stop(self, limit: float) -> None:
         """Asks the process to end, and insists after `limit` seconds."""
         if self.process is None:
             return
-        if self.process.poll() is None:
-            self.process.send_signal(signal.SIGINT)
-            try:
-                self.process.wait(limit)
-            except subprocess.TimeoutExpired:
-                self.process.kill()
-                self.process.wait()
+        self.interrupt()
+        try:
+            self.process.wait(limit)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
         if self.stream is not None:
             self.stream.close()
             self.stream = None
@@ -92,16 +96,19 @@ class Supervisor:
         """Prepares a flight; `start` begins it.
 
         Args:
-            mission: what to fly; it must have a plant.
+            mission: what to fly.
             bag: where to record; None records nothing.
             logs: folder for the nodes' logs.
             restart_limit_s: a node that dies twice within this wall time ends the run.
 
         Raises:
-            MissionError: an executable is missing.
+            MissionError: an executable is missing, or no node owns simulated time.
         """
+        if mission.plant is None:
+            raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
         self.mission = mission
         self.bag = bag
+        self._plant_name = mission.plant.name
         self.logs = logs
         self.restart_limit_s = restart_limit_s
         self.notes: list[str] = []
@@ -132,7 +139,7 @@ class Supervisor:
     @property
     def plant(self) -> Child:
         """The process that owns simulated time."""
-        return self.children[self.mission.plant.name]
+        return self.children[self._plant_name]
 
     def start(self) -> None:
         """Starts all processes, the plant last."""
@@ -166,11 +173,9 @@ class Supervisor:
 
     def stop(self) -> None:
         """Ends all processes: nodes first, then the recorder, which takes what they published last."""
-        nodes = [c for c in self.children.values() if c.process is not None]
-        for child in nodes:
-            if child.poll() is None:
-                child.process.send_signal(signal.SIGINT)
-        for child in nodes:
+        for child in self.children.values():
+            child.interrupt()
+        for child in self.children.values():
             child.stop(5.0)
         if self.recorder is not None:
             self.recorder.stop(30.0)

@@ -159,11 +159,9 @@ class Replay:
         copied = frozenset(copied) & self._recorded.keys()
         if writer is not None:
             self._announce(writer, copied)
-        else:
-            copied = frozenset()
         started = time.process_time()
         for message in self.reader.messages({*self._listeners, *copied, *self._flown} & self._recorded.keys()):
-            if message.topic in copied:
+            if writer is not None and message.topic in copied:
                 writer.write(message.topic, message.stamp_ns, message.data)
             if message.topic in self._flown:
                 self._flown[message.topic].add_flown(message.stamp_ns, message.data)

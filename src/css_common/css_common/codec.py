@@ -14,7 +14,7 @@ import importlib
 import math
 import struct
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -52,6 +52,10 @@ class Sample:
         # only reached for a missing field; declared so that type checkers know that fields are attributes
         raise AttributeError(f"the message has no field {name!r}")
 
+    if TYPE_CHECKING:
+
+        def __setattr__(self, name: str, value: Any) -> None: ...
+
     def __repr__(self) -> str:
         fields = ", ".join(f"{key}={value!r}" for key, value in vars(self).items())
         return f"Sample({fields})"
@@ -78,7 +82,7 @@ def type_name(message_type: type) -> str:
 class Codec:
     """Converter of one message type; get it with `codec_of`."""
 
-    def __init__(self, message_type: type) -> None:
+    def __init__(self, message_type: Any) -> None:
         self.message_type = message_type
         self.type_name = type_name(message_type)
         names = list(message_type.get_fields_and_field_types())

@@ -65,7 +65,8 @@ class Output:
     ends_cycle: bool = False
 
 
-Received = Mapping[str, Sample | None]
+Received = Mapping[str, Any]
+"""Input key to `Sample`; None for an optional input that is silent and for one that is not due."""
 Outgoing = Mapping[str, Sample]
 
 

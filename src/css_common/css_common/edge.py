@@ -87,26 +87,31 @@ class Edge:
         try:
             sample = self.codec.decode(data)
         except DecodeError as error:
-            return self._reject("malformed", str(error))
+            self._reject("malformed", str(error))
+            return None
+        refusal = self._refusal(sample)
+        if refusal is not None:
+            self._reject(*refusal)
+            return None
+        self.accepted += 1
+        return sample
+
+    def _refusal(self, sample: Sample) -> tuple[str, str] | None:
+        """Kind and detail of what is wrong with a message."""
         for name, length in self.source.lengths.items():
             given = len(getattr(sample, name))
             if given != length:
-                return self._reject("wrong_length", f"{given} {name} given, expected {length}")
+                return "wrong_length", f"{given} {name} given, expected {length}"
         if sample.frame_id not in self.frames:
-            return self._reject(
-                "wrong_frame", f"frame_id {sample.frame_id!r} given, expected {self.expected_frame!r}"
-            )
+            return "wrong_frame", f"frame_id {sample.frame_id!r} given, expected {self.expected_frame!r}"
         bad = self.codec.first_not_finite(self._finite_fields, sample)
         if bad is not None:
-            return self._reject("not_finite", f"{bad} holds NaN or infinity")
+            return "not_finite", f"{bad} holds NaN or infinity"
         # last, so that a rejected message does not move the clock that its successors are measured by
         refusal = self.guard.refusal(sample.stamp_ns)
         if refusal is not None:
-            return self._reject(
-                refusal, f"stamp {sample.stamp_ns} ns given, last accepted {self.guard.last} ns"
-            )
-        self.accepted += 1
-        return sample
+            return refusal, f"stamp {sample.stamp_ns} ns given, last accepted {self.guard.last} ns"
+        return None
 
     def _reject(self, kind: str, detail: str) -> None:
         self.rejected[kind] += 1

@@ -21,6 +21,7 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 from rclpy.parameter import Parameter as RosParameter
 from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.timer import Timer
 
 from css_common import ros_parameters, sections
 from css_common.codec import Sample, codec_of
@@ -84,10 +85,11 @@ class ComponentNode(LifecycleNode):
         super().__init__(name, context=context, use_global_arguments=use_global_arguments)
         self.mission = mission
         self.component_type = component_type
-        self.component: Component | None = None
+        # component and matcher exist from configure to clean-up, and only then do messages and timers come in
+        self.component: Component = None  # type: ignore[assignment]
         self.counters: Counter[str] = Counter()
         self.edges: dict[str, Edge] = {}
-        self.matcher: Matcher | None = None
+        self.matcher: Matcher = None  # type: ignore[assignment]
         self._table = component_type.table()
         self._canonical = self._declare()
         self._output_ports: dict[str, tuple] = {}
@@ -100,7 +102,7 @@ class ComponentNode(LifecycleNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self._watch_timer = self.create_timer(1.0, self._publish_diagnostics, clock=self._steady)
-        self._deadline_timer = None
+        self._deadline_timer: Timer | None = None
         self._overdue_stamp: int | None = None
         self._guard_lifecycle_service()
         ros_parameters.guard(self, self._table, self._canonical, self._tune, self._conflict)
@@ -235,7 +237,7 @@ class ComponentNode(LifecycleNode):
         self._subscriptions_made.clear()
         self._output_ports.clear()
         self.edges.clear()
-        self.component = self.matcher = None
+        self.component = self.matcher = None  # type: ignore[assignment]
 
     def destroy_node(self) -> None:
         """Destroys the node now; rclpy alone would leave it, and its name, to the garbage collector."""

@@ -62,7 +62,7 @@ def _use_cache_folder() -> None:
     if os.environ.get("NUMBA_CACHE_DIR") in (None, chosen_by_us):
         folder = str(cache_folder())
         os.environ["NUMBA_CACHE_DIR"] = os.environ["SUNPOINT_KERNEL_CACHE"] = folder
-        numba.config.CACHE_DIR = folder
+        numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]  # made at run time
 
 
 _use_cache_folder()

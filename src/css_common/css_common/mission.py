@@ -212,7 +212,7 @@ class Mission:
         raise MissionError(f"override {unknown_name(key, known)}")
 
     def _build_nodes(self) -> tuple[Node, ...]:
-        nodes = []
+        nodes: list[Node] = []
         for entry in self.values.graph.nodes:
             package, executable, name = parse_node_entry(entry, self.origin)
             if any(n.name == name for n in nodes):

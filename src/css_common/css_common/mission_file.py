@@ -22,7 +22,7 @@ class _Loader(yaml.SafeLoader):
     of ROS does not. Keys that stand twice are an error.
     """
 
-    yaml_implicit_resolvers: ClassVar[dict] = {}
+    yaml_implicit_resolvers: ClassVar[dict] = {}  # type: ignore[misc]  # one of the class for PyYAML, too
     bool_values: ClassVar[dict] = yaml.SafeLoader.bool_values | {"y": True, "n": False}
 
     def fetch_plain(self) -> None:

@@ -10,6 +10,8 @@ from collections.abc import Collection
 from functools import partial
 
 from builtin_interfaces.msg import Time
+from rclpy.publisher import Publisher
+from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
 
 from css_common.codec import DecodeError, Sample, stamp_of
@@ -21,7 +23,7 @@ from css_common.host import ComponentNode
 class PlantNode(ComponentNode):
     """Hosts a `Plant`."""
 
-    component: Plant | None
+    component: Plant
 
     def __init__(self, *args, **kwargs) -> None:
         super().__init__(*args, **kwargs)
@@ -36,11 +38,11 @@ class PlantNode(ComponentNode):
         self._begun = False
         self._waiting_since = time.monotonic()
         self._warned: set[str] = set()
-        self._startup_timer = None
-        self._pace_timer = None
-        self._go_on_timer = None
-        self._watch = None
-        self._clock_publisher = None
+        self._startup_timer: Timer | None = None
+        self._pace_timer: Timer | None = None
+        self._go_on_timer: Timer = None  # type: ignore[assignment]  # exists from configure to clean-up
+        self._watch: Timer | None = None
+        self._clock_publisher: Publisher | None = None
 
     @property
     def stamp_ns(self) -> int:
@@ -91,7 +93,8 @@ class PlantNode(ComponentNode):
         for timer in (self._pace_timer, self._go_on_timer, self._watch):
             if timer is not None:
                 self.destroy_timer(timer)
-        self._pace_timer = self._go_on_timer = self._watch = None
+        self._pace_timer = self._watch = None
+        self._go_on_timer = None  # type: ignore[assignment]
         if self._clock_publisher is not None:
             self.destroy_publisher(self._clock_publisher)
             self._clock_publisher = None

@@ -16,7 +16,9 @@ def node_main(component_type: type[Component]) -> Callable[[], int]:
 
         module = component_type.__module__
         if module == "__main__":  # python -m PACKAGE.nodes.NAME: the imported class is the one that missions refer to
-            module = sys.modules["__main__"].__spec__.name
+            spec = sys.modules["__main__"].__spec__
+            assert spec is not None
+            module = spec.name
         package, _, executable = module.partition(".nodes.")
         return node_process.main(find_component(package, executable), sys.argv[1:] if args is None else args)
 

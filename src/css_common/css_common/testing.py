@@ -44,7 +44,7 @@ class Bench:
         self._nodes: list[Node] = [self.node]
         self._publishers: dict[str, Publisher] = {}
         everything = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self.node.create_subscription(Log, "/rosout", lambda log: self.logs.append(log.msg), everything)
+        self.node.create_subscription(Log, "/rosout", self._note_log, everything)
 
     def __enter__(self) -> "Bench":
         return self
@@ -80,6 +80,9 @@ class Bench:
         order = sorted(mission.nodes, key=lambda node: node is mission.plant)
         return {node.name: self.host(node.component, mission, node.name) for node in order}
 
+    def _note_log(self, log: Log) -> None:
+        self.logs.append(log.msg)
+
     def publish(self, topic: str, message_type: type, sample: Sample | bytes, *, listened_to: bool = True) -> None:
         """Publishes a message, or bytes that should be one; unless told otherwise, once the topic has a listener."""
         publisher = self._publishers.get(topic)
@@ -93,9 +96,11 @@ class Bench:
         """Messages of a topic from now on, in a list that grows."""
         received: list[Sample] = []
         codec = codec_of(message_type)
-        self.node.create_subscription(
-            message_type, topic, lambda data: received.append(codec.decode(data)), RECORDER_SUBSCRIPTION, raw=True
-        )
+
+        def take(data: Any) -> None:
+            received.append(codec.decode(data))
+
+        self.node.create_subscription(message_type, topic, take, RECORDER_SUBSCRIPTION, raw=True)
         return received
 
     def request(self, service_type: type, name: str, request: Any) -> Any:

@@ -108,10 +108,10 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
     axis_n = multiply_transposed(dcm_bn, screen.axis_b)
     has_screen = dot(axis_n, axis_n) > 0.0
     ax, ay, az = _F(axis_n[0]), _F(axis_n[1]), _F(axis_n[2])
-    middle = 0.5 * (screen.full_cos + screen.dark_cos)
-    screen_sin = _F(math.sqrt(max(0.0, 1.0 - middle * middle)))
+    middle_cos = 0.5 * (screen.full_cos + screen.dark_cos)
+    screen_sin = _F(math.sqrt(max(0.0, 1.0 - middle_cos * middle_cos)))
     ramp = _F(0.5 * (screen.full_cos - screen.dark_cos))
-    middle = _F(middle)
+    middle = _F(middle_cos)
     for j in range(PATCHES):
         cosine = light[X + j] * ax + light[Y + j] * ay + light[Z + j] * az
         size = light[SIZE + j] * screen_sin

@@ -6,7 +6,7 @@ import math
 import erfa
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3
+from css_common.vectors import Mat3, mat3
 from css_environment.constants import EARTH_ROTATION_RATE
 from css_environment.time_scales import terrestrial_date, utc_date
 
@@ -16,10 +16,8 @@ def dcm_en_at(epoch_ns: int, elapsed_s: float = 0.0) -> Mat3:
 
     UT1 is taken equal to UTC and polar motion as zero: together less than 20 arcsec.
     """
-    return tuple(
-        tuple(float(value) for value in row)
-        for row in erfa.c2t06a(*terrestrial_date(epoch_ns, elapsed_s), *utc_date(epoch_ns, elapsed_s), 0.0, 0.0)
-    )
+    dates = (*terrestrial_date(epoch_ns, elapsed_s), *utc_date(epoch_ns, elapsed_s))
+    return mat3(erfa.c2t06a(*dates, 0.0, 0.0))
 
 
 @kernel

@@ -51,8 +51,15 @@ def keplerian_orbit(
             "an orbit needs a semi-major axis > 0 and an eccentricity in [0, 1), "
             f"got {semi_major_axis_m} m and {eccentricity}"
         )
-    angles = (inclination_deg, raan_deg, argument_of_perigee_deg, true_anomaly_deg)
-    return KeplerianOrbit(semi_major_axis_m, eccentricity, *map(math.radians, angles), EARTH_J2 if j2_drift else 0.0)
+    return KeplerianOrbit(
+        semi_major_axis_m,
+        eccentricity,
+        math.radians(inclination_deg),
+        math.radians(raan_deg),
+        math.radians(argument_of_perigee_deg),
+        math.radians(true_anomaly_deg),
+        EARTH_J2 if j2_drift else 0.0,
+    )
 
 
 def orbit_period(orbit: KeplerianOrbit) -> float:

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from css_common.attitude import mrp_rate, mrp_shadow
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, scale, subtract
+from css_common.vectors import Mat3, Vec3, add, cross, dot, mat3, multiply, scale, subtract
 
 _RADIANS_PER_RPM = 2.0 * math.pi / 60.0
 # Passes of the speed limit: each shrinks the excess by the ratio of wheel to body inertia.
@@ -75,8 +75,7 @@ def rigid_body(
 
 
 def _rows(matrix: np.ndarray) -> Mat3:
-    a, b, c = (tuple(float(x) for x in r) for r in matrix)
-    return (a, b, c)
+    return mat3(np.ascontiguousarray(matrix))
 
 
 @kernel

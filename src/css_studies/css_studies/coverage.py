@@ -18,7 +18,7 @@ from css_common.kernel import kernel
 from css_common.mission import Mission, Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values
-from css_common.vectors import Mat3, Vec3, angle_between, multiply_transposed
+from css_common.vectors import Mat3, Vec3, angle_between, mat3, multiply_transposed
 from css_estimation import wavg
 from css_estimation.cell_layout import CellLayout, brightest
 from css_estimation.nodes.wavg import Wavg
@@ -60,8 +60,7 @@ def grid_about(
     polar = (np.arange(polar_cells) + 0.5) * (math.pi / polar_cells)
     azimuth = (np.arange(azimuth_cells) + 0.5) * (2.0 * math.pi / azimuth_cells)
     weight = np.sin(polar)
-    rows = tuple(tuple(float(v) for v in axis) for axis in axes)
-    return Grid(polar, azimuth, rows, weight / weight.sum())
+    return Grid(polar, azimuth, mat3(axes), weight / weight.sum())
 
 
 def grid_of(mission: Mission) -> Grid:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from css_common.codec import Sample, codec_of
-from css_common.component import Component, Outgoing, Plant
+from css_common.component import Outgoing, Plant
 from css_common.mission import Event, Mission, MissionError, Node
 from css_common.schema import shaped_values
 from css_studies.flight_log import FlightLog
@@ -47,15 +47,15 @@ def fly_directly(mission: Mission) -> FlightLog:
     Raises:
         MissionError: the mission has no plant, or its nodes wait for each other in a circle.
     """
-    if mission.plant is None:
-        raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     steps = max(mission.steps, 1)
     wires = {topic: _Wire(message_type, steps) for topic, message_type in mission.topics.items()}
     stamp_ns = mission.epoch_ns
     plant.apply_events(stamp_ns)
-    outgoing = plant.component.begin()
-    while not plant.component.finished:
+    clockwork = plant.component
+    assert isinstance(clockwork, Plant)
+    outgoing = clockwork.begin()
+    while not clockwork.finished:
         bus: dict[str, Sample] = {}
         plant.publish(outgoing, wires, bus)
         for part in others:
@@ -115,7 +115,7 @@ class _Part:
     """A component of the flight with its wiring and what is to happen to it."""
 
     def __init__(self, node: Node, mission: Mission) -> None:
-        self.component: Component | Plant = node.component(node.name, node.values)
+        self.component = node.component(node.name, node.values)
         self._inputs = [(i.key, i.topic) for i in node.inputs]
         self._required = [(i.topic, i.divider) for i in node.inputs if i.required]
         self._topics = {output.key: output.topic for output in node.outputs}
@@ -162,6 +162,8 @@ class _Part:
 def _in_order(mission: Mission) -> list[Node]:
     """Nodes such that each comes after those it listens to; the plant, which begins the step, comes last."""
     plant = mission.plant
+    if plant is None:
+        raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
     known = {output.topic for output in plant.outputs}
     waiting = [node for node in mission.nodes if node is not plant]
     published = set(mission.topics)

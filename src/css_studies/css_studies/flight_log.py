@@ -238,13 +238,13 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         }
         if not messages:
             raise BagError(f"{path}: holds no truth, Sun estimate, cell output, wheel or control message")
-        append = {topic: data.append for topic, (_, data) in messages.items()}
+        append = {topic: received.append for topic, (_, received) in messages.items()}
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
     log = FlightLog(str(path), mission, notes=notes)
-    for topic, (message_type, data) in messages.items():
+    for topic, (message_type, received) in messages.items():
         try:
-            log.add(topic, message_type, stack(codec_of(message_type), data).sorted())
+            log.add(topic, message_type, stack(codec_of(message_type), received).sorted())
         except DecodeError as error:
             raise BagError(f"{path}: topic {topic}: {error}") from error
     return log

@@ -59,7 +59,7 @@ class CssArray(Component):
         self._view, self._light, self._work = new_earth_view(), new_light(), new_workspace()
         self._albedo = np.zeros(len(nominal))
         self._segment_s = -1.0
-        self._dcm_en = None
+        self._dcm_en = dcm_en_at(self.epoch_ns, 0.0)
 
     def tune(self, values: Values) -> None:
         super().tune(values)

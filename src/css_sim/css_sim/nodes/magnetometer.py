@@ -13,7 +13,6 @@ from css_common.vectors import multiply
 from css_msgs.msg import SpacecraftState
 from css_sim import magnetometer
 
-
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
 
