@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What people type: estimator requests, missions, options; and what they get when it is wrong."""
+
+import json
+
+import pytest
+
+from css_bringup.commands import demo, fly
+from css_bringup.commands import replay as replay_command
+from css_bringup.flight import FlightResult, default_bag
+from css_bringup.options import USAGE
+from css_bringup.replay import parse_request
+from css_bringup.report import result_object
+from css_common.mission import default_mission, load_mission
+from css_common.mission_file import MissionError
+
+
+def test_requests_name_estimator_and_changes():
+    request = parse_request("ekf:gyro=off,sigma_voltage=0.2")
+    assert request.kind == "ekf"
+    assert request.changes == {"use_gyro": "false", "sigma_voltage": "0.2"}
+    assert request.label == "ekf_gyro_off_sigma_voltage_0_2"
+    assert parse_request("wavg").label == "wavg"
+
+
+@pytest.mark.parametrize("text", ["", "a b", "ekf:gyro", "ekf:gyro=perhaps", "../ekf"])
+def test_requests_of_another_form_are_refused(text):
+    with pytest.raises(MissionError):
+        parse_request(text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["no_such_mission"], "no_such_mission"),
+        (["okeefe_2013", "--set", "cells.field_of_vew_deg=100"], "did you mean cells.field_of_view_deg?"),
+        (["okeefe_2013", "--set", "cells.field_of_view_deg=190"], "at most 180"),
+        (["okeefe_2013", "--set", "spacecraft.inertia=1,0,0,0,1,0,0,0,9"], "triangle inequality"),
+        (["okeefe_2013", "--set", "wheels.axes=1,0,0,0,1,0"], "span 2 of 3"),
+        (["okeefe_2013", "--duration", "-5"], "above 0"),
+        (["okeefe_2013", "--set", "nonsense"], "KEY=VALUE"),
+        (["okeefe_2013", "--set", "graph.nodes=css_estimation/ekf"], "needs the topic"),
+        (["okeefe_2013", "--set", "graph.nodes=css_sim/dynamo"], "no css_sim/nodes/dynamo.py"),
+    ],
+)
+@pytest.mark.parametrize("command", [fly, demo])
+def test_a_wrong_mission_is_one_line_and_exit_code_2(command, arguments, said, capsys):
+    assert command.main(arguments) == USAGE
+    printed = capsys.readouterr().err
+    assert said in " ".join(printed.split())
+    assert "Traceback" not in printed
+
+
+def test_a_missing_recording_is_one_line_and_exit_code_2(tmp_path, capsys):
+    assert replay_command.main([str(tmp_path / "nothing")]) == USAGE
+    assert "nothing" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unwritable_folder_is_one_line(tmp_path, capsys):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    assert fly.main(["okeefe_2013", "--duration", "1", "--out", str(blocked / "bag")]) == USAGE
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_recordings_never_share_a_folder(tmp_path):
+    mission = default_mission()
+    first = default_bag(mission, tmp_path)
+    first.mkdir()
+    second = default_bag(mission, tmp_path)
+    assert second != first and not second.exists()
+
+
+def test_result_counts_what_the_cycles_must_have_produced(tmp_path):
+    mission = load_mission("okeefe_2013")
+    full = {f"/{topic}": 100 for topic in mission.topics}
+    result = FlightResult(mission, steps=100, simulated_s=10.0, wall_s=2.0, bag=tmp_path, recorded=full)
+    assert result.messages_lost == 0
+    assert result.realtime_factor == 5.0
+    result.recorded = full | {"/css/voltages": 97}
+    assert result.messages_lost == 3
+    assert result.messages_recorded == 100 * len(full) - 3
+
+
+def test_json_result_has_the_documented_keys(tmp_path):
+    result = FlightResult(load_mission("okeefe_2013"), bag=tmp_path)
+    assert list(json.loads(json.dumps(result_object(result, [])))) == [
+        "mission", "case", "seed", "simulated_s", "wall_s", "cpu_s", "realtime_factor",
+        "messages_recorded", "messages_lost", "bag", "runs",
+    ]  # fmt: skip
