@@ -147,7 +147,8 @@ class ComponentNode(LifecycleNode):
             self.get_logger().error(str(error))
             return _FAILURE
         except Exception:
-            self.get_logger().error(f"{transition.__name__.lstrip('_')} failed:\n{traceback.format_exc()}")
+            if self.context.ok():  # else a signal has ended ROS under it, and that is no news
+                self.get_logger().error(f"{transition.__name__.lstrip('_')} failed:\n{traceback.format_exc()}")
             return TransitionCallbackReturn.ERROR
         return _SUCCESS
 

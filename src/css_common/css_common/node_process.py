@@ -66,10 +66,12 @@ def run_node(component_type: type[Component], arguments: list[str]) -> int:
         print(f"{executable}: {error}", file=sys.stderr)
         return USAGE_ERROR
     except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
-        if node is not None:
+        if node is None:
+            print(f"{executable}: {' '.join(str(error).split())}", file=sys.stderr)
+            return USAGE_ERROR
+        if rclpy.ok():
             raise
-        print(f"{executable}: {' '.join(str(error).split())}", file=sys.stderr)
-        return USAGE_ERROR
+        # else a signal ended ROS while the node was being set up
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     finally:
