@@ -57,7 +57,7 @@ def run_node(component_type: type[Component], arguments: list[str]) -> int:
         node = create_node(component_type, executable, mission)
         executor.add_node(node)
         if not node.start():
-            return USAGE_ERROR
+            return USAGE_ERROR if rclpy.ok() else 0
         plant = node if isinstance(node, PlantNode) else None
         spin_until(executor, lambda: plant is not None and plant.done)
         if plant is not None and plant.failed:
