@@ -15,6 +15,9 @@ from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 
 
+WITHOUT_ESTIMATOR = "css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"
+
+
 def test_requests_name_estimator_and_changes():
     request = parse_request("ekf:gyro=off,sigma_voltage=0.2")
     assert request.kind == "ekf"
@@ -39,7 +42,7 @@ def test_requests_of_another_form_are_refused(text):
         (["okeefe_2013", "--set", "wheels.axes=1,0,0,0,1,0,0,1,0"], "span 2 of 3"),
         (["okeefe_2013", "--duration", "-5"], "above 0"),
         (["okeefe_2013", "--set", "nonsense"], "KEY=VALUE"),
-        (["okeefe_2013", "--set", "graph.nodes=css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"], "needs the topic"),
+        (["okeefe_2013", "--set", f"graph.nodes={WITHOUT_ESTIMATOR}"], "needs the topic"),
         (["okeefe_2013", "--set", "graph.nodes=css_sim/dynamo"], "no css_sim/nodes/dynamo.py"),
     ],
 )

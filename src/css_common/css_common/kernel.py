@@ -10,7 +10,9 @@ import hashlib
 import importlib.util
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import llvmlite
 import numba
@@ -69,3 +71,27 @@ _use_cache_folder()
 
 kernel = numba.njit(cache=True, error_model="numpy", fastmath=False)
 """Compiles a pure function on scalars, tuples and small arrays; `kernel_function.py_func` is the plain Python."""
+
+
+def typed_call(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A kernel bound to the argument types of its first call.
+
+    Numba looks the types of all arguments up at every call from Python, which for nested parameters takes several
+    times as long as the kernel itself. A component calls its kernels with the same types for ever and need not ask
+    again. The types must really never change: they are not checked any more.
+    """
+    entry: Callable[..., Any] | None = None
+
+    def call(*arguments: Any) -> Any:
+        nonlocal entry
+        if entry is not None:
+            return entry(*arguments)
+        result = function(*arguments)
+        overloads = getattr(function, "overloads", None)  # none when compilation is switched off for debugging
+        if overloads is not None:
+            entry = overloads[tuple(map(numba.typeof, arguments))].entry_point
+        else:
+            entry = function
+        return result
+
+    return call

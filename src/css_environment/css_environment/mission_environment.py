@@ -7,6 +7,7 @@ The simulated truth builds one with the truth's parameters, flight software one 
 from functools import lru_cache
 
 from css_common.epochs import parse_utc
+from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_environment import ephemeris
 from css_environment.constants import EARTH_RADIUS
@@ -49,10 +50,11 @@ class MissionEnvironment:
         self._field = field
         self._conical_shadow = conical_shadow
         self._tables: Ephemeris | None = None
+        self._covers, self._at = typed_call(ephemeris.covers), typed_call(ephemeris.at)
 
     def tables(self, elapsed_s: float) -> Ephemeris:
         """Tables that hold an instant [s after the epoch]."""
-        if self._tables is None or not ephemeris.covers(self._tables, elapsed_s):
+        if self._tables is None or not self._covers(self._tables, elapsed_s):
             self._tables = _segment_tables(
                 self._orbit,
                 self._epoch_ns,
@@ -64,4 +66,4 @@ class MissionEnvironment:
 
     def at(self, elapsed_s: float) -> EnvironmentState:
         """Environment at an instant [s after the epoch]."""
-        return ephemeris.at(self.tables(elapsed_s), elapsed_s)
+        return self._at(self.tables(elapsed_s), elapsed_s)

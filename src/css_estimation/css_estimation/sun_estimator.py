@@ -7,6 +7,7 @@ from typing import ClassVar
 from sensor_msgs.msg import Imu
 
 from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_estimation.eclipse_prediction import EclipsePrediction
 from css_estimation.messages import gyro_reading, sun_estimate_fields
@@ -43,6 +44,7 @@ class SunEstimator(Component):
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)
         self._state = self.algorithm.initial_state(self._parameters)
+        self._step = typed_call(self.algorithm.step)
         self._last_stamp_ns: int | None = None
         sensors_decide = self.values.eclipse.source == "sensors"
         self._prediction = None if sensors_decide else EclipsePrediction(self.values)
@@ -58,7 +60,7 @@ class SunEstimator(Component):
         assert cells is not None  # a required input
         gyro_b, gyro_valid = gyro_reading(received["gyro"])
         predicted = PREDICTION_UNKNOWN if self._prediction is None else self._prediction.at(stamp_ns)
-        self._state, heading = self.algorithm.step(
+        self._state, heading = self._step(
             self._parameters,
             self._state,
             since_ns / 1e9,

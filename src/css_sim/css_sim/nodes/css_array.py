@@ -7,6 +7,7 @@ import numpy as np
 
 from css_common.attitude import mrp_to_dcm
 from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
@@ -59,6 +60,10 @@ class CssArray(Component):
         self._view, self._light, self._work = new_earth_view(), new_light(), new_workspace()
         self._albedo = np.zeros(len(nominal))
         self._segment_s = -1.0
+        self._to_dcm, self._turn = typed_call(mrp_to_dcm), typed_call(multiply)
+        self._advance_earth = typed_call(advance_dcm_en)
+        self._sources, self._output = typed_call(albedo_sources), typed_call(albedo_output)
+        self._sample = typed_call(sun_cells.sample)
         self._dcm_en = dcm_en_at(self.epoch_ns, 0.0)
 
     def tune(self, values: Values) -> None:
@@ -67,23 +72,23 @@ class CssArray(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
-        dcm_bn = mrp_to_dcm(_vector(truth.sigma_bn))
+        dcm_bn = self._to_dcm(_vector(truth.sigma_bn))
         sun_n = _vector(truth.sun_n)
         if self.values.albedo.enabled:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
-            albedo_sources(
+            self._sources(
                 self._view, _vector(truth.r_n), sun_n, truth.solar_flux, dcm_en, self._reflectivity, self._light
             )
-            albedo_output(
+            self._output(
                 self._light, self._cells, self._p.screen, self._p.cos_half_view, dcm_bn, self._work, self._albedo
             )
         voltages = np.zeros(len(self._cells))
-        saturated = sun_cells.sample(
+        saturated = self._sample(
             self._p,
             self._cells,
             self._key,
             self.step_of(stamp_ns),
-            multiply(dcm_bn, sun_n),
+            self._turn(dcm_bn, sun_n),
             truth.solar_flux * truth.illumination,
             self._albedo,
             voltages,
@@ -96,7 +101,7 @@ class CssArray(Component):
         if start_s != self._segment_s:
             self._segment_s = start_s
             self._dcm_en = dcm_en_at(self.epoch_ns, start_s)
-        return advance_dcm_en(self._dcm_en, elapsed_s - start_s)
+        return self._advance_earth(self._dcm_en, elapsed_s - start_s)
 
 
 def _vector(values: np.ndarray) -> tuple[float, float, float]:

@@ -8,6 +8,7 @@ from geometry_msgs.msg import PoseStamped
 
 from css_common.attitude import mrp_to_quaternion
 from css_common.component import INERTIAL, Input, Outgoing, Output, Plant, Received
+from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
@@ -78,6 +79,7 @@ class Dynamics(Plant):
         self._wheels_at_rest = np.zeros(len(self._momentum))
         self._rods_at_rest = np.zeros(len(self._craft.rod_axes_b))
         self._torque = np.zeros(len(self._momentum))
+        self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
         self._steps = round(values.mission.duration / values.mission.period)
         self.finished = False
 
@@ -86,7 +88,7 @@ class Dynamics(Plant):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         wheels, rods = received["wheels"], received.get("rods")
-        self._state, torque_limited, speed_limited = advance(
+        self._state, torque_limited, speed_limited = self._advance(
             self._craft,
             self._state,
             self._momentum,
@@ -105,7 +107,7 @@ class Dynamics(Plant):
         self._surroundings = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
         state, surroundings = self._state, self._surroundings
         speed = np.zeros(len(self._momentum))
-        wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
+        self._wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
         messages = {
             "truth": self.message(
                 "truth",

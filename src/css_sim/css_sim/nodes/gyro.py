@@ -5,6 +5,7 @@ import numpy as np
 from sensor_msgs.msg import Imu
 
 from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
@@ -34,11 +35,12 @@ class Gyro(Component):
         self._key = random_key(self.values.mission.seed, self.values.mission.case)
         self._p = gyro.parameters(self.values)
         self._errors = gyro.draw_errors(self._p, self._key)
+        self._measure = typed_call(gyro.measure)
         self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         x, y, z = received["truth"].omega_bn_b.tolist()
-        rate = gyro.measure(self._p, self._errors, self._key, self.step_of(stamp_ns), (x, y, z))
+        rate = self._measure(self._p, self._errors, self._key, self.step_of(stamp_ns), (x, y, z))
         return self._imu(stamp_ns, np.array(rate), self._covariance)
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:

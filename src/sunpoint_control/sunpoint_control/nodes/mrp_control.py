@@ -7,6 +7,7 @@ import numpy as np
 from sensor_msgs.msg import MagneticField
 
 from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
 from css_msgs.msg import ControlStatus, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand
@@ -69,6 +70,7 @@ class MrpControl(Component):
     def configure(self) -> None:
         self._parameters = control.parameters(self.values)
         self._state = control.initial_state(self._parameters)
+        self._step = typed_call(control.step)
         self._last_stamp_ns: int | None = None
         self._field_b = _ZERO
         self._field_stamp_ns: int | None = None
@@ -84,7 +86,7 @@ class MrpControl(Component):
         assert sun is not None and wheels is not None  # required inputs
         torques = np.zeros(len(self.values.wheels.axes))
         dipoles = np.zeros(len(self.values.rods.axes))
-        self._state, output = control.step(
+        self._state, output = self._step(
             self._parameters,
             self._state,
             since_ns / 1e9,
