@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from ament_index_python.packages import get_package_prefix
+
 from bootstrap.verbs import VERBS
 
 ROOT = Path(__file__).parents[1]

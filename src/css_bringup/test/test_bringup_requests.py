@@ -14,7 +14,6 @@ from css_bringup.report import result_object
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 
-
 WITHOUT_ESTIMATOR = "css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"
 
 
