@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from css_bringup.replay import EstimatorRequest, Replay, Replayed
+from css_bringup.report import result_object
 from css_common.mission import Mission, default_mission, load_mission, mission_from_text
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
@@ -54,21 +55,17 @@ class ReplayResult:
 
     def result_object(self) -> dict[str, Any]:
         """What `--json` prints: the keys of a flight, and whether bytes are as they flew."""
-        values = self.mission.values.mission
-        return {
-            "mission": self.mission.name,
-            "case": values.case,
-            "seed": values.seed,
-            "simulated_s": round(self.simulated_s, 6),
-            "wall_s": round(self.wall_s, 3),
-            "cpu_s": round(self.cpu_s, 3),
-            "realtime_factor": round(self.simulated_s / self.wall_s, 1) if self.wall_s > 0.0 else 0.0,
-            "messages_recorded": self.messages,
-            "messages_lost": 0,
-            "bag": str(self.bag),
-            "runs": self.runs,
-            "rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()},
-        }
+        common = result_object(
+            self.mission,
+            self.runs,
+            self.bag,
+            simulated_s=self.simulated_s,
+            wall_s=self.wall_s,
+            cpu_s=self.cpu_s,
+            recorded=self.messages,
+            lost=0,
+        )
+        return common | {"rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()}}
 
 
 def mission_of_bag(path: Path, remap: Mapping[str, str], overrides: Iterable[str], name: str | None) -> Mission:

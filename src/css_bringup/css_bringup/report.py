@@ -3,31 +3,56 @@
 
 import json
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 
 from css_bringup.flight import FlightResult
+from css_common.mission import Mission
 from css_studies.flight_metrics import Run
 from css_studies.flight_summary import criteria_failures, summary_table
 
 
-def result_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
-    """What `--json` prints."""
-    values = result.mission.values.mission
+def result_object(
+    mission: Mission,
+    runs: Sequence[Run],
+    bag: Path | None,
+    *,
+    simulated_s: float,
+    wall_s: float,
+    cpu_s: float,
+    recorded: int,
+    lost: int,
+) -> dict[str, Any]:
+    """What `--json` prints, of a flight and of a replay alike."""
     return {
-        "mission": result.mission.name,
-        "case": values.case,
-        "seed": values.seed,
-        "simulated_s": round(result.simulated_s, 6),
-        "wall_s": round(result.wall_s, 3),
-        "cpu_s": round(result.cpu_s, 3),
-        "realtime_factor": round(result.realtime_factor, 1),
-        "messages_recorded": result.messages_recorded,
-        "messages_lost": result.messages_lost,
-        "bag": str(result.bag) if result.bag else None,
+        "mission": mission.name,
+        "case": mission.values.mission.case,
+        "seed": mission.values.mission.seed,
+        "simulated_s": round(simulated_s, 6),
+        "wall_s": round(wall_s, 3),
+        "cpu_s": round(cpu_s, 3),
+        "realtime_factor": round(simulated_s / wall_s, 1) if wall_s > 0.0 else 0.0,
+        "messages_recorded": recorded,
+        "messages_lost": lost,
+        "bag": str(bag) if bag else None,
         "runs": list(runs),
     }
+
+
+def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
+    """The JSON object of a flight."""
+    return result_object(
+        result.mission,
+        runs,
+        result.bag,
+        simulated_s=result.simulated_s,
+        wall_s=result.wall_s,
+        cpu_s=result.cpu_s,
+        recorded=result.messages_recorded,
+        lost=result.messages_lost,
+    )
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:

@@ -10,7 +10,7 @@ from css_bringup.commands import replay as replay_command
 from css_bringup.flight import FlightResult, default_bag
 from css_bringup.options import USAGE
 from css_bringup.replay import parse_request
-from css_bringup.report import result_object
+from css_bringup.report import flight_object
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 
@@ -87,7 +87,7 @@ def test_result_counts_what_the_cycles_must_have_produced(tmp_path):
 
 def test_json_result_has_the_documented_keys(tmp_path):
     result = FlightResult(load_mission("okeefe_2013"), bag=tmp_path)
-    assert list(json.loads(json.dumps(result_object(result, [])))) == [
+    assert list(json.loads(json.dumps(flight_object(result, [])))) == [
         "mission", "case", "seed", "simulated_s", "wall_s", "cpu_s", "realtime_factor",
         "messages_recorded", "messages_lost", "bag", "runs",
     ]  # fmt: skip

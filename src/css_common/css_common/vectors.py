@@ -4,6 +4,8 @@
 import math
 from typing import TypeAlias
 
+import numpy as np
+
 from css_common.kernel import kernel
 
 Vec3: TypeAlias = tuple[float, float, float]
@@ -108,6 +110,12 @@ def matmul(a: Mat3, b: Mat3) -> Mat3:
         (dot(a[1], bt[0]), dot(a[1], bt[1]), dot(a[1], bt[2])),
         (dot(a[2], bt[0]), dot(a[2], bt[1]), dot(a[2], bt[2])),
     )
+
+
+def vector_of(values: np.ndarray) -> Vec3:
+    """Three numbers of a message as a vector; plain Python, because the way into a kernel costs more."""
+    x, y, z = values.tolist()
+    return (x, y, z)
 
 
 @kernel

@@ -25,7 +25,7 @@ from css_bringup.options import (
 )
 from css_bringup.replay import parse_request
 from css_bringup.replaying import replay
-from css_bringup.report import print_json, print_result, result_object, unmet
+from css_bringup.report import flight_object, print_json, print_result, unmet
 from css_studies.flight_figures import write_figures
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
@@ -75,7 +75,7 @@ def _run(arguments: argparse.Namespace) -> int:
         console.print(f"figure: {file}", soft_wrap=True)
     runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
     if arguments.json:
-        print_json(result_object(flight, runs))
+        print_json(flight_object(flight, runs))
     missed = unmet(flight, flown)
     for line in missed:
         errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)

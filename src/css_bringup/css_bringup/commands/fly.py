@@ -16,7 +16,7 @@ from css_bringup.options import (
     guarded,
     mission_of,
 )
-from css_bringup.report import print_json, print_result, result_object, unmet
+from css_bringup.report import flight_object, print_json, print_result, unmet
 from css_common.mission import Mission
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
@@ -62,7 +62,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     for line in missed:
         errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
     if as_json:
-        print_json(result_object(result, runs))
+        print_json(flight_object(result, runs))
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED

@@ -11,7 +11,7 @@ from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.vectors import multiply
+from css_common.vectors import multiply, vector_of
 from css_environment.albedo import albedo_output, new_workspace
 from css_environment.earth_light import albedo_sources, new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
@@ -72,12 +72,12 @@ class CssArray(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
-        dcm_bn = self._to_dcm(_vector(truth.sigma_bn))
-        sun_n = _vector(truth.sun_n)
+        dcm_bn = self._to_dcm(vector_of(truth.sigma_bn))
+        sun_n = vector_of(truth.sun_n)
         if self.values.albedo.enabled:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
             self._sources(
-                self._view, _vector(truth.r_n), sun_n, truth.solar_flux, dcm_en, self._reflectivity, self._light
+                self._view, vector_of(truth.r_n), sun_n, truth.solar_flux, dcm_en, self._reflectivity, self._light
             )
             self._output(
                 self._light, self._cells, self._p.screen, self._p.cos_half_view, dcm_bn, self._work, self._albedo
@@ -102,11 +102,6 @@ class CssArray(Component):
             self._segment_s = start_s
             self._dcm_en = dcm_en_at(self.epoch_ns, start_s)
         return self._advance_earth(self._dcm_en, elapsed_s - start_s)
-
-
-def _vector(values: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return (x, y, z)
 
 
 main = node_main(CssArray)

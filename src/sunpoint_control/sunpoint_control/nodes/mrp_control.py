@@ -10,6 +10,7 @@ from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.vectors import vector_of
 from css_msgs.msg import ControlStatus, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand
 from sunpoint_control import sun_pointing_control as control
 from sunpoint_control.modes import MODE_SAFE, REASON_COMMANDED
@@ -90,10 +91,10 @@ class MrpControl(Component):
             self._parameters,
             self._state,
             since_ns / 1e9,
-            _vector(sun.sun_b),
+            vector_of(sun.sun_b),
             sun.validity,
             sun.eclipse,
-            _vector(sun.omega_bn_b),
+            vector_of(sun.omega_bn_b),
             sun.rate_source,
             wheels.speed,
             *self._field(stamp_ns, received),
@@ -114,7 +115,7 @@ class MrpControl(Component):
         """Last field measurement, for as long as the next may be on its way."""
         field = received.get("field")
         if field is not None and field.magnetic_field_covariance[0] != -1.0:
-            self._field_b = _vector(field.magnetic_field)
+            self._field_b = vector_of(field.magnetic_field)
             self._field_stamp_ns = stamp_ns
         if self._field_stamp_ns is None:
             return _ZERO, False
@@ -143,11 +144,6 @@ class MrpControl(Component):
         if self.values.rods.fitted:
             messages["rods"] = self.message("rods", stamp_ns, saturated=output.rods_saturated, dipole=dipoles)
         return messages
-
-
-def _vector(values: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = values.tolist()
-    return (x, y, z)
 
 
 main = node_main(MrpControl)
