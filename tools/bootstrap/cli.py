@@ -13,6 +13,9 @@ from bootstrap.plan import find_need
 from bootstrap.project import Project, Refusal, State
 from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
 
+# Two processes, because every test of the graph waits for its nodes more than it computes.
+ALL_TESTS = ["-q", "-n", "2"]
+
 
 def main(arguments: list[str]) -> int:
     """Run one command line; returns only when no executable has taken over."""
@@ -72,7 +75,7 @@ def _test(project: Project, arguments: list[str], env: dict[str, str]) -> int:
     from bootstrap.checks import failing_linters, pytest_command
 
     os.chdir(project.root)
-    return _replace_process(pytest_command(project, arguments, failing_linters(project, env)), env)
+    return _replace_process(pytest_command(project, arguments or ALL_TESTS, failing_linters(project, env)), env)
 
 
 def _shell(project: Project, arguments: list[str]) -> list[str]:

@@ -50,7 +50,7 @@ OWN_USAGE = {
     "test": """Usage: ./sunpoint test [PYTEST ARGUMENTS]
 
 Runs ruff, mypy and pytest with message type checks on, and fails if any of them does. Examples:
-  ./sunpoint test -n 2                             tests on two processors
+  ./sunpoint test                                  all tests, on two processors (pytest -q -n 2)
   ./sunpoint test src/css_common/test -k attitude  some tests
 All options: ./sunpoint shell -c 'pytest --help'""",
     "shell": """Usage: ./sunpoint shell [-c COMMAND | BASH ARGUMENTS]

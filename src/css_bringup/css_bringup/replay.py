@@ -104,6 +104,7 @@ class Replayed:
         matcher: brings its inputs together.
         comparison: against the flight; None when it did not fly with these parameters.
         messages: estimates given.
+        failures: cycles that failed and messages withheld.
     """
 
     label: str
@@ -112,6 +113,7 @@ class Replayed:
     matcher: Matcher
     comparison: Comparison | None = None
     messages: int = 0
+    failures: int = 0
     outputs: dict[str, tuple[str, Codec]] = field(default_factory=dict)
 
 
@@ -177,14 +179,28 @@ class Replay:
     def _step(
         self, run: Replayed, stamp_ns: int, received: Mapping[str, Sample | None], writer: BagWriter | None
     ) -> None:
-        for key, sample in run.component.cycle(stamp_ns, received).items():
+        try:
+            outgoing = run.component.cycle(stamp_ns, received)
+        except Exception as error:  # as in flight: no estimate for this stamp, and the next cycle goes on
+            self._note_failure(run, f"cycle failed: {error!r}")
+            return
+        for key, sample in outgoing.items():
             topic, codec = run.outputs[key]
+            bad = codec.first_not_finite(codec.real_fields(), sample)
+            if bad is not None:
+                self._note_failure(run, f"{bad} is not finite, message withheld")
+                continue
             data = codec.encode(sample)
             run.messages += 1
             if writer is not None:
                 writer.write(topic, sample.stamp_ns, data)
             if run.comparison is not None:
                 run.comparison.add_replayed(sample.stamp_ns, data)
+
+    def _note_failure(self, run: Replayed, text: str) -> None:
+        run.failures += 1
+        if run.failures == 1:
+            self.reports.append(f"{run.label}: {text} (further ones are counted, not reported)")
 
     def _announce(self, writer: BagWriter, copied: Iterable[str]) -> None:
         for topic in sorted(copied):

@@ -29,7 +29,7 @@ _EPILOG = """\
 Parameter changes are recorded as /parameter_events. /clock and /rosout are recorded when named with --topic.
 Exit code: 0 the recording is complete, 1 it could not be created or written, 2 wrong usage or mission."""
 
-_QUIET_S = 0.2
+_QUIET_S = 0.5  # a loaded machine delivers late what was published before the signal
 _DRAIN_LIMIT_S = 5.0
 
 
