@@ -12,7 +12,7 @@ from collections import Counter
 from functools import partial
 
 import numpy as np
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -26,6 +26,7 @@ from rclpy.timer import Timer
 from css_common import ros_parameters, sections
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Outgoing, Output, Plant
+from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import Edge, Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
@@ -100,8 +101,7 @@ class ComponentNode(LifecycleNode):
         self._last_stamp = 0
         self._began: tuple[float, float] | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self._watch_timer = self.create_timer(1.0, self._publish_diagnostics, clock=self._steady)
+        self._diagnostics = Diagnostics(self, self.health)
         self._deadline_timer: Timer | None = None
         self._overdue_stamp: int | None = None
         self._guard_lifecycle_service()
@@ -265,7 +265,7 @@ class ComponentNode(LifecycleNode):
             "wall_s": time.perf_counter() - wall,
             "cpu_s": time.process_time() - cpu,
             "last_stamp_ns": self._last_stamp,
-            "counters": self.health()[2],
+            "counters": self.health().counters,
         }
 
     # Messages
@@ -363,7 +363,7 @@ class ComponentNode(LifecycleNode):
 
     # Health
 
-    def health(self) -> tuple[bytes, str, dict[str, int]]:
+    def health(self) -> Health:
         """Level, one line and counters for /diagnostics."""
         counters = dict(self.counters)
         for key, edge in self.edges.items():
@@ -374,22 +374,8 @@ class ComponentNode(LifecycleNode):
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
         if self.counters["cycle_failed"] or self.counters["withheld_not_finite"]:
-            return DiagnosticStatus.ERROR, "cycles failed", counters
+            return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
         if any(edge.rejected for edge in self.edges.values()):
-            return DiagnosticStatus.WARN, "messages rejected", counters
-        return DiagnosticStatus.OK, "active" if self._is_active else "inactive", counters
-
-    def _publish_diagnostics(self) -> None:
-        level, message, counters = self.health()
-        array = DiagnosticArray()
-        array.header.stamp.sec, array.header.stamp.nanosec = divmod(self._last_stamp, 1_000_000_000)
-        array.status = [
-            DiagnosticStatus(
-                level=level,
-                name=self.get_fully_qualified_name(),
-                message=message,
-                hardware_id="",
-                values=[KeyValue(key=key, value=str(value)) for key, value in counters.items()],
-            )
-        ]
-        self._diagnostics.publish(array)
+            return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
+        state = "active" if self._is_active else "inactive"
+        return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)

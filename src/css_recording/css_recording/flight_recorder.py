@@ -59,6 +59,11 @@ class FlightRecorder:
         return dict(self._received)
 
     @property
+    def latest_ns(self) -> int:
+        """Latest stamp seen [ns]; 0 before the first."""
+        return self._latest_ns or 0
+
+    @property
     def message_count(self) -> int:
         """Messages received."""
         return self._received.total()

@@ -12,6 +12,7 @@ from functools import partial
 from itertools import groupby
 from operator import attrgetter
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import Executor
@@ -20,6 +21,7 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
 from css_common.codec import stamp_of
+from css_common.diagnostics import Diagnostics, Health
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_recording.bag_reader import BagMessage, BagReader
 from css_recording.errors import BagError
@@ -61,6 +63,7 @@ class PlayerNode(Node):
         self.report = PlaybackReport()
         self._reader = reader
         self._options = options
+        self._diagnostics = Diagnostics(self, self.health)
         counts = {entry.topic.name: entry.count for entry in reader.topics}
         chosen = counts if options.topics is None else [self.resolve_topic_name(name) for name in options.topics]
         unknown = [name for name in chosen if name not in counts]
@@ -77,6 +80,14 @@ class PlayerNode(Node):
         self._now = now
         self._executor: Executor | None = None
         self._stopped: Callable[[], bool] = lambda: False
+
+    def health(self) -> Health:
+        """Level, one line and counters for /diagnostics."""
+        counters = {**self.report.published, "stamps": self.report.stamps}
+        if self.report.not_installed:
+            message = f"types not installed: {', '.join(self.report.not_installed)}"
+            return Health(DiagnosticStatus.WARN, message, counters, 0)
+        return Health(DiagnosticStatus.OK, "playing", counters, 0)
 
     def play(self, executor: Executor, stopped: Callable[[], bool] = lambda: False) -> PlaybackReport:
         """Plays the recording once; returns early when `stopped`.

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
+from diagnostic_msgs.msg import DiagnosticStatus
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -18,6 +19,7 @@ from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
+from css_common.diagnostics import Diagnostics, Health
 from css_common.mission import Mission
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
 from css_recording.bag_metadata import Topic, absolute
@@ -88,6 +90,7 @@ class RecorderNode(Node):
         self._look_every = _DISCOVER_EVERY if everything else _LOOK_EVERY
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = self.create_timer(self._look_every, self._look, clock=steady)
+        self._diagnostics = Diagnostics(self, self.health)
 
     @property
     def ready(self) -> bool:
@@ -108,6 +111,16 @@ class RecorderNode(Node):
     def counters(self) -> dict[str, int]:
         """What was not as it should be: gaps, stamps out of order, messages later than the hold-back time."""
         return {**self._recorder.counters, "late": self._recorder.writer.late_messages}
+
+    def health(self) -> Health:
+        """Level, one line and counters for /diagnostics."""
+        counters = {**self.counts, **self.counters}
+        stamp_ns = self._recorder.latest_ns
+        if self.failure:
+            return Health(DiagnosticStatus.ERROR, self.failure, counters, stamp_ns)
+        if not self.ready:
+            return Health(DiagnosticStatus.WARN, "waiting for publishers", counters, stamp_ns)
+        return Health(DiagnosticStatus.OK, "recording", counters, stamp_ns)
 
     def close(self) -> None:
         """Finishes the recording; again does nothing.
