@@ -90,6 +90,7 @@ class Codec:
             raise TypeError(f"{self.type_name} does not begin with a std_msgs/Header")
         slots = message_type.SLOT_TYPES[1:]
         self.fields = [self._field(name, slot) for name, slot in zip(names[1:], slots, strict=True)]
+        self._real_fields = [field for field in self.fields if field.code in "df"]
 
     def _field(self, name: str, slot: Any) -> _Field:
         kind = type(slot).__name__
@@ -204,8 +205,10 @@ class Codec:
         Raises:
             KeyError: a name that the type does not have.
         """
+        if not names:
+            return self._real_fields
         by_name = {f.name: f for f in self.fields}
-        return [f for f in ([by_name[n] for n in names] or self.fields) if f.code in "df"]
+        return [f for f in (by_name[n] for n in names) if f.code in "df"]
 
     @staticmethod
     def first_not_finite(fields: list[_Field], sample: Sample) -> str | None:

@@ -8,13 +8,12 @@ builds its wait set anew, which is what costs rclpy most of its time.
 """
 
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
-from rclpy.node import Node
 from rclpy.utilities import get_default_context
 
 _CALLBACKS_BETWEEN_CHECKS = 64
@@ -88,9 +87,3 @@ def spin_until(
             # what a shutdown in the middle of a wait looks like from inside
             if context.ok():
                 raise
-
-
-def add_nodes(executor: Executor, nodes: Iterable[Node]) -> None:
-    """Adds nodes to an executor."""
-    for node in nodes:
-        executor.add_node(node)

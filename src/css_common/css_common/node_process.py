@@ -15,8 +15,8 @@ from css_common.codec import type_name
 from css_common.component import Component, Plant
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
-from css_common.mission import Mission, belongs_to_ros, mission_from_text
-from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
+from css_common.mission import Mission, belongs_to_ros
+from css_common.mission_file import MissionError, flattened, read_sections
 from css_common.plant_host import PlantNode
 from css_common.schema import ParameterError, default_values, unknown_name
 from css_common.sections import GRAPH
@@ -115,7 +115,8 @@ def mission_of_arguments(component_type: type[Component], arguments: list[str]) 
             nodes = []
         if not any((entry.partition(":")[2] or entry.rpartition("/")[2]) == name for entry in nodes):
             shared["graph.nodes"] = [*nodes, f"{package}/{executable}:{name}"]
-    return mission_from_text(dump_sections(parameters), ", ".join(files) or "defaults")
+    given = {section: flat for section, flat in parameters.items() if flat}
+    return Mission(", ".join(files) or "defaults", given)
 
 
 def _refuse_unknown_overrides(component_type: type[Component], name: str, arguments: list[str]) -> None:

@@ -19,6 +19,7 @@ from rclpy.qos import qos_profile_parameter_events
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
+from css_common.codec import type_name
 from css_common.diagnostics import Diagnostics, Health
 from css_common.mission import Mission
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
@@ -27,7 +28,7 @@ from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.flight_recorder import FlightRecorder
 from css_recording.provenance import software_versions
-from css_recording.ros_topics import matching_qos, message_class_of, recorded_qos, type_name_of
+from css_recording.ros_topics import matching_qos, message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
 
 PARAMETER_EVENTS = "/parameter_events"
@@ -141,11 +142,11 @@ class RecorderNode(Node):
                 topic = self.resolve_topic_name(name)
                 self._expected[topic] = output.message_type
                 spacing_ns[topic] = output.divider * mission.period_ns
-                recorded.append(Topic(topic, type_name_of(output.message_type), (recorded_qos(LOOP_PUBLISHER),)))
+                recorded.append(Topic(topic, type_name(output.message_type), (recorded_qos(LOOP_PUBLISHER),)))
             if mission.plant is not None:
                 self._last = {self.resolve_topic_name(output.topic) for output in mission.plant.outputs}
         events = (recorded_qos(qos_profile_parameter_events),)
-        recorded.append(Topic(PARAMETER_EVENTS, type_name_of(ParameterEvent), events))
+        recorded.append(Topic(PARAMETER_EVENTS, type_name(ParameterEvent), events))
         return FlightRecorder(BagWriter(bag, recorded, metadata, overwrite=overwrite, limits=limits), spacing_ns)
 
     def _watch_parameters(self) -> None:

@@ -17,11 +17,6 @@ _DURABILITY = {DurabilityPolicy.TRANSIENT_LOCAL: "transient_local", DurabilityPo
 _HISTORY = {HistoryPolicy.KEEP_LAST: "keep_last", HistoryPolicy.KEEP_ALL: "keep_all"}
 
 
-def type_name_of(message_class: type) -> str:
-    """Full name, "css_msgs/msg/CssVoltages", of a message class."""
-    return f"{message_class.__module__.split('.')[0]}/msg/{message_class.__name__}"
-
-
 def message_class_of(type_name: str) -> type:
     """Message class of a full type name.
 

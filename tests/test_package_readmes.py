@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The README's tables say what the nodes declare."""
+"""The tables in the READMEs of packages say what the nodes declare."""
 
 from pathlib import Path
 
@@ -8,9 +8,11 @@ import pytest
 from css_common.schema import default_values
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.nodes.wavg import Wavg
+from sunpoint_control.nodes.mrp_control import MrpControl
 
-README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
-COMPONENTS = (Ekf, Wavg)
+SOURCES = Path(__file__).parents[1] / "src"
+# component, and the parameters with which it shows all of its topics
+COMPONENTS = ((Ekf, {}), (Wavg, {}), (MrpControl, {"rods__fitted": True}))
 
 
 def rows(text):
@@ -20,12 +22,15 @@ def rows(text):
     return {row[0].strip("`* "): row for row in cells}
 
 
-SECTIONS = {part.split("\n", 1)[0].strip(): rows(part) for part in README.split("### ")[1:]}
+def readme(kind):
+    """Text of the README of a component's package."""
+    return (SOURCES / kind.__module__.split(".")[0] / "README.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("kind", COMPONENTS)
+@pytest.mark.parametrize("kind", [kind for kind, _ in COMPONENTS])
 def test_parameters(kind):
-    table = SECTIONS[kind.__module__.rpartition(".")[2]]
+    sections = {part.split("\n", 1)[0].strip(): rows(part) for part in readme(kind).split("### ")[1:]}
+    table = sections[kind.__module__.rpartition(".")[2]]
     for parameter in kind.parameters:
         name, default, unit, _, meaning = table.pop(parameter.name)
         assert name.endswith("*") == parameter.tunable, parameter.name
@@ -35,10 +40,10 @@ def test_parameters(kind):
             assert float(default) == parameter.default, parameter.name
 
 
-@pytest.mark.parametrize("kind", COMPONENTS)
-def test_topics(kind):
+@pytest.mark.parametrize(("kind", "shown"), COMPONENTS)
+def test_topics(kind, shown):
     name = kind.__module__.rpartition(".")[2]
-    values = default_values(kind.table())
+    values = default_values(kind.table(), **shown)
     for port in (*kind.inputs(name, values), *kind.outputs(name, values)):
         package = port.message_type.__module__.split(".")[0]
-        assert rows(README)[port.topic][1] == f"`{package}/{port.message_type.__name__}`"
+        assert rows(readme(kind))[port.topic][1] == f"`{package}/{port.message_type.__name__}`"
