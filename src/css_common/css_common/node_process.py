@@ -38,51 +38,77 @@ def create_node(component_type: type[Component], name: str, mission: Mission, **
     return host(component_type, name, mission, **options)
 
 
+class FirstInterrupt:
+    """Makes the first Ctrl-C a KeyboardInterrupt and every later one nothing.
+
+    Attributes:
+        armed: the next Ctrl-C raises; false from the first one on, and once cleaning up has begun.
+    """
+
+    def __init__(self) -> None:
+        self.armed = True
+        signal.signal(signal.SIGINT, self._raise_once)
+
+    def _raise_once(self, number: int, frame: object) -> None:
+        if self.armed:
+            self.armed = False
+            raise KeyboardInterrupt
+
+
 def run_node(component_type: type[Component], arguments: list[str]) -> int:
     """Runs one node until it is told to stop; 0 on a clean end, 1 when it failed, 2 on bad parameters.
 
     `--summary FILE` before `--ros-args` leaves the figures of the run in a JSON file at its end.
     """
-    executable = component_type.__module__.rpartition(".")[2]
-    node = None
     summary = None
     if "--summary" in arguments[:-1]:
         at = arguments.index("--summary")
         summary = Path(arguments[at + 1])
         arguments = arguments[:at] + arguments[at + 2 :]
+    interrupt = FirstInterrupt()
+    started: list[ComponentNode] = []
     try:
-        mission = mission_of_arguments(component_type, arguments)
-        rclpy.init(args=[sys.argv[0], *arguments])
-        executor = create_executor()
-        node = create_node(component_type, executable, mission)
-        executor.add_node(node)
-        if not node.start():
-            return USAGE_ERROR if rclpy.ok() else 0
-        plant = node if isinstance(node, PlantNode) else None
-        spin_until(executor, lambda: plant is not None and plant.done)
-        if plant is not None and plant.failed:
-            return 1
-    except (MissionError, ParameterError) as error:
-        print(f"{executable}: {error}", file=sys.stderr)
-        return USAGE_ERROR
-    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
-        if node is None:
-            print(f"{executable}: {' '.join(str(error).split())}", file=sys.stderr)
-            return USAGE_ERROR
-        if rclpy.ok():
-            raise
-        # else a signal ended ROS while the node was being set up
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
+        try:
+            return _create_and_spin(component_type, arguments, started)
+        finally:
+            interrupt.armed = False  # from here on nothing tears the clean-up apart
+    except KeyboardInterrupt:
+        return 0
     finally:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C must not tear the clean-up apart
-        if node is not None:
+        for node in started:
             if summary is not None:
                 summary.write_text(json.dumps(node.summary()), encoding="utf-8")
             node.finish()
             node.destroy_node()
         rclpy.try_shutdown()
-    return 0
+
+
+def _create_and_spin(component_type: type[Component], arguments: list[str], started: list[ComponentNode]) -> int:
+    executable = component_type.__module__.rpartition(".")[2]
+    try:
+        mission = mission_of_arguments(component_type, arguments)
+        rclpy.init(args=[sys.argv[0], *arguments])
+        executor = create_executor()
+        node = create_node(component_type, executable, mission)
+        started.append(node)
+        executor.add_node(node)
+        if not node.start():
+            return USAGE_ERROR if rclpy.ok() else 0
+        plant = node if isinstance(node, PlantNode) else None
+        spin_until(executor, lambda: plant is not None and plant.done)
+        return 1 if plant is not None and plant.failed else 0
+    except (MissionError, ParameterError) as error:
+        print(f"{executable}: {error}", file=sys.stderr)
+        return USAGE_ERROR
+    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+        if not started:
+            print(f"{executable}: {' '.join(str(error).split())}", file=sys.stderr)
+            return USAGE_ERROR
+        if rclpy.ok():
+            raise
+        return 0  # a signal ended ROS while the node was being set up
+    except ExternalShutdownException:
+        return 0
 
 
 def mission_of_arguments(component_type: type[Component], arguments: list[str]) -> Mission:
