@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One flight of a Sun-pointing spacecraft in Basilisk, timed.
 
-    .cache/basilisk/bin/python benchmarks/basilisk_flight.py scenario.json --albedo --estimator wls
+    .cache/basilisk/bin/python -I benchmarks/basilisk_flight.py scenario.json --albedo --estimator wls
 
 Runs in an environment of its own, which `./sunpoint bench monte-carlo` makes, and knows nothing of Sunpoint but
 the scenario it is given: a JSON file whose values are SI units and radians in the names of
