@@ -185,10 +185,10 @@ def _progress(flights: int) -> Iterator[Callable[[str, str], None]]:
         console=console, transient=True, disable=not console.is_terminal,
     )  # fmt: skip
     with bar:
-        task = bar.add_task("", total=flights, completed=-1)
+        task, done = bar.add_task("", total=flights), iter(range(flights))
 
         def announce(kind: str, side: str) -> None:
             name = "Basilisk" if side == "peer" else "Sunpoint"
-            bar.update(task, advance=1, description=f"{name}, {kind.replace('_', ' ')}")
+            bar.update(task, completed=next(done), description=f"{name}, {kind.replace('_', ' ')}")
 
         yield announce
