@@ -145,13 +145,15 @@ def filter_with_sun(
 def filter_without_sun(
     p: FieldRateParameters, track: FieldTrack, change: FieldChange, omega_bn_b: Vec3, limit: float
 ) -> tuple[FieldTrack, Vec3]:
-    """Filtered rate after one cycle in the dark: across the field from its turning, about the field as it was."""
+    """Filtered rate after one cycle in the dark: across the field from its turning, about the field going to zero.
+
+    Nothing is known about the field's own line. A rate held there would keep a rate damping at work on an error that
+    its action never shows in, and spin the body up.
+    """
     if not change.known:
         return track, omega_bn_b
     field_b, previous_b = unit(change.field_b), unit(change.previous_b)
     # a fixed direction like that of the Sun, so Eq. 15 of O'Keefe & Schaub holds for it
     measured = rate_from_sun_vectors(field_b, previous_b, change.interval, limit)
-    about = dot(omega_bn_b, field_b)
-    across_b = subtract(omega_bn_b, scale(about, field_b))
-    across_b = low_pass(across_b, measured, low_pass_gain(p.cutoff, change.interval))
-    return FieldTrack(track.field_b, track.since, 0.0), add(across_b, scale(about, field_b))
+    omega_bn_b = low_pass(omega_bn_b, measured, low_pass_gain(p.cutoff, change.interval))
+    return FieldTrack(track.field_b, track.since, 0.0), omega_bn_b
