@@ -20,6 +20,7 @@ from rich import box
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
@@ -186,7 +187,7 @@ def print_study(study: Study, result: dict, console: Console) -> None:
         for name in ("estimator", "gyro"):
             table.add_column(name, vertical="bottom")
         for _, heading, _ in _COLUMNS:
-            table.add_column(heading, justify="right", vertical="bottom")
+            table.add_column(Text(heading), justify="right", vertical="bottom")
         for row in rows:
             figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
             table.add_row(row["estimator"], row["gyro"], *figures)
