@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
-from css_bringup.flight import FlightResult, Progress
+from css_bringup.flight import FlightResult, Progress, Stopped
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
@@ -78,8 +78,8 @@ class ComposedFlight:
         assert isinstance(node, PlantNode)
         return node
 
-    def fly(self, progress: Progress | None = None) -> FlightResult:
-        """Flies the mission to its end, or until interrupted."""
+    def fly(self, progress: Progress | None = None, stopped: Stopped = lambda: False) -> FlightResult:
+        """Flies the mission to its end, or until stopped or interrupted."""
         result = FlightResult(self.mission, bag=self.bag)
         for node in self.nodes.values():
             if node is not self.plant and not node.start():
@@ -91,18 +91,20 @@ class ComposedFlight:
         plant = self.plant
         try:
             # until the first step is out, partners are being matched: not part of the flight's time
-            self._spin(lambda: plant.begun or plant.done, None)
+            self._spin(lambda: plant.begun or plant.done or stopped(), None)
             gc.collect()
             gc.freeze()
             wall, cpu = time.perf_counter(), time.process_time()
             try:
-                self._spin(lambda: plant.done, progress)
+                self._spin(lambda: plant.done or stopped(), progress)
             finally:
                 result.wall_s = time.perf_counter() - wall
                 result.cpu_s = time.process_time() - cpu
                 gc.unfreeze()
+            result.interrupted = not plant.done
         except (KeyboardInterrupt, ExternalShutdownException):
             result.interrupted = True
+        plant.halt()
         self._settle(result)
         return result
 

@@ -18,7 +18,7 @@ from typing import IO, Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
-from css_bringup.flight import FlightResult
+from css_bringup.flight import FlightResult, Stopped
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 
@@ -205,7 +205,11 @@ def _cause(code: int) -> str:
 
 
 def fly_processes(
-    mission: Mission, bag: Path | None, logs: Path, on_poll: Callable[[Supervisor], None] | None = None
+    mission: Mission,
+    bag: Path | None,
+    logs: Path,
+    on_poll: Callable[[Supervisor], None] | None = None,
+    stopped: Stopped = lambda: False,
 ) -> FlightResult:
     """Flies a mission with one process per node.
 
@@ -214,12 +218,16 @@ def fly_processes(
         bag: where to record; None records nothing.
         logs: folder for the nodes' logs.
         on_poll: called between looks at the processes.
+        stopped: the flight is asked to end.
     """
     result = FlightResult(mission, bag=bag)
     supervisor = Supervisor(mission, bag, logs)
     try:
         supervisor.start()
         while supervisor.check():
+            if stopped():
+                result.interrupted = True
+                break
             if on_poll is not None:
                 on_poll(supervisor)
             time.sleep(_POLL)
