@@ -17,7 +17,7 @@ from rich.table import Table
 
 from css_bringup.flight import FlightResult
 from css_bringup.flying import fly
-from css_bringup.options import FAILED, console, errors, guarded
+from css_bringup.options import FAILED, complain, console, guarded
 from css_bringup.report import print_json
 from css_common.mission import Mission, load_mission
 
@@ -57,7 +57,7 @@ def _run(arguments: argparse.Namespace) -> int:
         for name, (processes, recorded) in _CONFIGURATIONS.items():
             result = _fly_once(mission, processes=processes, recorded=recorded)
             if result.failure or result.interrupted:
-                errors.print(f"[red]{name}: the flight failed:[/red] {result.failure or 'interrupted'}")
+                complain(f"{name}: the flight failed:", result.failure or "interrupted")
                 return FAILED
             measured[name].append(result)
     figures = {name: _figures(results) for name, results in measured.items()}

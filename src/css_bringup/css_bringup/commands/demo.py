@@ -18,6 +18,7 @@ from css_bringup.options import (
     INTERRUPTED,
     add_mission_options,
     add_output_options,
+    complain,
     console,
     errors,
     guarded,
@@ -62,7 +63,7 @@ def _run(arguments: argparse.Namespace) -> int:
         errors.print(f"interrupted; the recording up to here is complete: {bag}", soft_wrap=True)
         return INTERRUPTED
     if flight.failure:
-        errors.print(f"[red]the flight failed:[/red] {flight.failure}", soft_wrap=True)
+        complain("the flight failed:", flight.failure)
         return FAILED
     log = read_flight(bag)
     flown = estimator_runs(log, [mission.values.graph.estimator])
@@ -78,7 +79,7 @@ def _run(arguments: argparse.Namespace) -> int:
         print_json(flight_object(flight, runs))
     missed = unmet(flight, flown)
     for line in missed:
-        errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
+        complain("criterion missed:", line)
     return FAILED if missed else 0
 
 

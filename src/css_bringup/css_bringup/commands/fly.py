@@ -11,6 +11,7 @@ from css_bringup.options import (
     INTERRUPTED,
     add_mission_options,
     add_output_options,
+    complain,
     console,
     errors,
     guarded,
@@ -57,10 +58,10 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
         runs = estimator_runs(read_flight(result.bag))
     print_result(console, result, runs)
     if result.failure:
-        errors.print(f"[red]the flight failed:[/red] {result.failure}", soft_wrap=True)
+        complain("the flight failed:", result.failure)
     missed = unmet(result, runs) if result.bag is not None else []
     for line in missed:
-        errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
+        complain("criterion missed:", line)
     if as_json:
         print_json(flight_object(result, runs))
     if result.interrupted:

@@ -10,7 +10,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from css_bringup.options import FAILED, console, errors, guarded
+from css_bringup.options import FAILED, complain, console, guarded
 from css_bringup.replay import parse_request
 from css_bringup.replaying import ReplayResult, mission_of_bag, replay
 from css_bringup.report import print_json
@@ -64,7 +64,7 @@ def _run(arguments: argparse.Namespace) -> int:
         print_json(result.result_object())
     silent = [run.label for run in result.replayed if run.messages == 0]
     if silent:
-        errors.print(f"[red]no estimate from {', '.join(silent)}:[/red] their inputs never met in one stamp")
+        complain(f"no estimate from {', '.join(silent)}:", "their inputs never met in one stamp")
         return FAILED
     return 0
 
