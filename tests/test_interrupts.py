@@ -58,3 +58,16 @@ def test_signals_mean_afterwards_what_they_meant_before():
         _interrupt()
     assert stop.came
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_flight_that_cannot_be_recorded_any_more_ends(tmp_path):
+    mission = short_mission(5000.0)
+    with ComposedFlight(mission, tmp_path / "bag") as flight:
+
+        def fill_disk(seconds: float) -> None:
+            flight.recorder.failure = "No space left on device"
+
+        result = flight.fly(fill_disk)
+    assert result.failure == "the flight is not recorded any more: No space left on device"
+    assert not result.interrupted
+    assert result.steps < mission.steps

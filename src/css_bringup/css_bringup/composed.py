@@ -90,18 +90,23 @@ class ComposedFlight:
             return result
         plant = self.plant
         try:
+            recorder = self.recorder
+
+            def over() -> bool:
+                return plant.done or stopped() or (recorder is not None and bool(recorder.failure))
+
             # until the first step is out, partners are being matched: not part of the flight's time
-            self._spin(lambda: plant.begun or plant.done or stopped(), None)
+            self._spin(lambda: plant.begun or over(), None)
             gc.collect()
             gc.freeze()
             wall, cpu = time.perf_counter(), time.process_time()
             try:
-                self._spin(lambda: plant.done or stopped(), progress)
+                self._spin(over, progress)
             finally:
                 result.wall_s = time.perf_counter() - wall
                 result.cpu_s = time.process_time() - cpu
                 gc.unfreeze()
-            result.interrupted = not plant.done
+            result.interrupted = not plant.done and stopped()
         except (KeyboardInterrupt, ExternalShutdownException):
             result.interrupted = True
         plant.halt()
@@ -119,6 +124,8 @@ class ComposedFlight:
             self.recorder.close()
             topics = {f"/{topic}" for topic in self.mission.topics}
             result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
+            if self.recorder.failure:
+                result.failure = f"the flight is not recorded any more: {self.recorder.failure}"
         if plant.counters["partners_lost"]:
             result.notes.append(f"{plant.counters['partners_lost']} partners fell silent")
 

@@ -8,7 +8,7 @@ import pytest
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
 from css_bringup.flight import FlightResult, default_bag
-from css_bringup.options import USAGE
+from css_bringup.options import FAILED, USAGE
 from css_bringup.replay import parse_request
 from css_bringup.report import flight_object
 from css_common.mission import default_mission, load_mission
@@ -84,6 +84,16 @@ def test_result_counts_what_the_cycles_must_have_produced(tmp_path):
     result.recorded = full | {"/css/voltages": 97}
     assert result.messages_lost == 3
     assert result.messages_recorded == 100 * len(full) - 3
+
+
+def test_a_recorder_that_died_is_what_a_failed_flight_reports(tmp_path, capfd):
+    (tmp_path / "flight_0.mcap").write_bytes(b"")
+    mission = load_mission("okeefe_2013")
+    result = FlightResult(mission, steps=100, bag=tmp_path, failure="recorder died (SIGKILL)")
+    assert fly.conclude(mission, result, as_json=True) == FAILED
+    printed = capfd.readouterr()
+    assert printed.err.splitlines() == ["the flight failed: recorder died (SIGKILL)"]
+    assert json.loads(printed.out.splitlines()[-1])["runs"] == []
 
 
 def test_json_result_has_the_documented_keys(tmp_path):
