@@ -61,11 +61,15 @@ def complain(heading: str, text: object = "") -> None:
     errors.print(Text(heading, style="red"), str(text), soft_wrap=True)
 
 
+class FiguresError(Exception):
+    """Figures that cannot be written, with the folder and the reason."""
+
+
 def guarded(command: Callable[[], int]) -> int:
     """Runs a command; what the user got wrong becomes one line and exit code 2, Ctrl-C becomes 130."""
     try:
         return command()
-    except (MissionError, BagError) as error:
+    except (MissionError, BagError, FiguresError) as error:
         complain("error:", error)
         return USAGE
     except KeyboardInterrupt:

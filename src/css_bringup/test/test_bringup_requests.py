@@ -2,6 +2,7 @@
 """What people type: estimator requests, missions, options; and what they get when it is wrong."""
 
 import json
+from pathlib import Path
 
 import pytest
 
@@ -14,6 +15,7 @@ from css_bringup.report import flight_object
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 
+ROOT = Path(__file__).parents[3]
 WITHOUT_ESTIMATOR = "css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"
 
 
@@ -65,6 +67,16 @@ def test_an_unwritable_folder_is_one_line(tmp_path, capfd):
     blocked.write_text("not a folder")
     assert fly.main(["okeefe_2013", "--duration", "1", "--out", str(blocked / "bag")]) == USAGE
     assert "Traceback" not in capfd.readouterr().err
+
+
+def test_unwritable_figures_are_one_line(tmp_path, capfd):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    reference = str(ROOT / "bags" / "reference")
+    code = replay_command.main([reference, "--out", str(tmp_path / "bag"), "--figures", str(blocked / "figures")])
+    assert code == USAGE
+    printed = capfd.readouterr().err
+    assert "figures cannot be written" in printed and "Traceback" not in printed
 
 
 def test_recordings_never_share_a_folder(tmp_path):

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from css_bringup.commands.replay import print_replay
+from css_bringup.figures import print_figures
 from css_bringup.flight import default_bag
 from css_bringup.flying import fly
 from css_bringup.options import (
@@ -27,7 +28,6 @@ from css_bringup.options import (
 from css_bringup.replay import parse_request
 from css_bringup.replaying import replay
 from css_bringup.report import flight_object, print_json, print_result, unmet
-from css_studies.flight_figures import write_figures
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
 
@@ -72,8 +72,8 @@ def _run(arguments: argparse.Namespace) -> int:
     replayed = replay(bag, bag.with_name(f"{bag.name}_replay"), mission, map(parse_request, _REPLAYED), {})
     print_replay(replayed)
     folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
-    for file in (*write_figures(log, folder), *write_figures(replayed.log, folder / "replay")):
-        console.print(f"figure: {file}", soft_wrap=True)
+    print_figures(log, folder)
+    print_figures(replayed.log, folder / "replay")
     runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
     if arguments.json:
         print_json(flight_object(flight, runs))
