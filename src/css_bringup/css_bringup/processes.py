@@ -36,9 +36,11 @@ class Child:
     process: subprocess.Popen | None = None
     stream: IO[bytes] | None = None
     deaths: list[float] = field(default_factory=list)
+    asked_to_end: bool = False
 
     def start(self) -> None:
         """Starts the process; its output is appended to its log."""
+        self.asked_to_end = False
         self.stream = self.log.open("ab")
         # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
         self.process = subprocess.Popen(
@@ -50,8 +52,9 @@ class Child:
         return self.process.poll() if self.process else None
 
     def interrupt(self) -> None:
-        """Asks the process to end, if it runs."""
-        if self.process is not None and self.process.poll() is None:
+        """Asks the process to end, if it runs; once, because an interpreter that is ending dies of a second SIGINT."""
+        if self.process is not None and self.process.poll() is None and not self.asked_to_end:
+            self.asked_to_end = True
             self.process.send_signal(signal.SIGINT)
 
     def stop(self, limit: float) -> None:
