@@ -132,7 +132,7 @@ def reflectivity_at(reflectivity, direction_e: Vec3) -> float:
     x, y, z = direction_e
     in_rows = (_arc(math.sqrt(x * x + y * y), z) / math.pi + 0.5) * rows - 0.5
     column = cell_at(x, y, z, rows, columns) % columns
-    south = min(max(int(math.floor(in_rows)), 0), rows - 1)
+    south = min(max(math.floor(in_rows), 0), rows - 1)
     north = min(south + 1, rows - 1)
     part = min(max(in_rows - south, 0.0), 1.0)
     return reflectivity[south, column] + part * (reflectivity[north, column] - reflectivity[south, column])

@@ -19,7 +19,7 @@ from css_estimation.sun_rate import rate_from_sun_vectors
 PARAMETERS: Table = (
     flag("rate.use_field", False, "without gyro, take from the magnetic field what the Sun vectors leave open"),
     real("rate.field_cutoff", 0.1, "Hz", "corner of the low-pass on a field-derived rate", low=0.0, high=1e3),
-    real("rate.field_angle_deg", 15.0, "deg", "no rate about the Sun line from a field nearer to it", low=1.0, high=89.0),
+    real("rate.field_angle_deg", 15.0, "deg", "no rate about the Sun line from a field so near it", low=1.0, high=89.0),
     real("rate.field_hold", 10.0, "s", "how long the last field and the rate from it are good", low=0.0, high=1e4),
 )
 

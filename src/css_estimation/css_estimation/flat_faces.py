@@ -17,7 +17,7 @@ from css_common.vectors import Vec3, norm, scale
 from css_estimation.cell_layout import READABLE
 
 PARAMETERS: Table = (
-    integers("flat.cells", (), "-", "numbers of the cells flat on the faces; empty: those with normals along body axes"),
+    integers("flat.cells", (), "-", "numbers of the cells flat on the faces; empty: all with normals along body axes"),
 )
 
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")

@@ -23,7 +23,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, integers, real
-from css_common.vectors import Vec3, add, dot, norm, scale, unit
+from css_common.vectors import Vec3, add, dot, norm, scale, unit, vector_of
 from css_estimation import flat_faces, safe_hold, sun_tracking
 from css_estimation.cell_layout import READABLE, brightest
 from css_estimation.eclipse_detector import detect_eclipse
@@ -97,9 +97,10 @@ def parameters(values: Values) -> PyramidParameters:
     """
     cells = _pyramid_cells(values)
     if len(cells) != 3 or not all(0 <= i < len(values.cells.normals) for i in cells):
-        pyramid = Pyramid((-1, -1, -1), ((0.0, 0.0, 0.0),) * 3, values.pyramid.minimum)
+        zero = (0.0, 0.0, 0.0)
+        pyramid = Pyramid((-1, -1, -1), (zero, zero, zero), values.pyramid.minimum)
     else:
-        a, b, c = (tuple(float(x) for x in values.cells.normals[i]) for i in cells)
+        a, b, c = (vector_of(values.cells.normals[i]) for i in cells)
         pyramid = Pyramid((cells[0], cells[1], cells[2]), (a, b, c), values.pyramid.minimum)
     x, y, z = (float(c) for c in values.spacecraft.array_normal)
     entry_cos = math.cos(math.radians(values.pyramid.entry_deg))

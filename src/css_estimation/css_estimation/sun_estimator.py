@@ -25,7 +25,7 @@ class SunEstimator(Component):
         mode_names: names of its modes, if changes between them are worth a line in the log.
     """
 
-    shared = ("cells", "orbit", "magnetometer")
+    shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "magnetometer")
     algorithm: ClassVar[ModuleType]
     mode_names: ClassVar[Mapping[int, str]] = {}
 

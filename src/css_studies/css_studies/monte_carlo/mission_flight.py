@@ -90,6 +90,7 @@ class MissionFlight:
             self._estimator.values,
             common,
             self._own_earth,
+            self._feels_field(),
             MODELS[array.albedo.model],
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
@@ -183,6 +184,10 @@ class MissionFlight:
             substeps=plant.substeps,
             array_normal_b=(x, y, z),
         )
+
+    def _feels_field(self) -> bool:
+        plant = self._plant.values
+        return self._magnetometer is not None or plant.rods.fitted or bool(np.any(plant.disturbances.dipole))
 
     def _faults(self, array: Values, numbers: np.ndarray) -> np.ndarray:
         return np.stack([cell_faults.case_faults(array, self._key(int(number))) for number in numbers])

@@ -107,6 +107,7 @@ class SurroundingsTables:
         estimator: values of the estimator that flies (its eclipse prediction).
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
+        field: something feels the geomagnetic field.
         albedo_model: `albedo_vector.PATCHES`, `VECTOR` or `NADIR`.
     """
 
@@ -116,9 +117,10 @@ class SurroundingsTables:
         estimator: Values,
         reflectivity: np.ndarray | None,
         own_earth: bool = False,
+        field: bool = True,
         albedo_model: int = PATCHES,
     ) -> None:
-        self._environment: MissionEnvironment = flight_environment(plant)
+        self._environment: MissionEnvironment = flight_environment(plant, field)
         self._prediction = None if estimator.eclipse.source == "sensors" else EclipsePrediction(estimator)
         self._period_ns = round(plant.mission.period * 1e9)
         self._epoch_ns = parse_utc(plant.mission.epoch)
