@@ -18,8 +18,11 @@ def test_changes_are_named_and_those_within_a_minute_counted():
     assert log.line(100 * S, 1) is None
     assert log.line(101 * S, 1) is None
     assert log.line(102 * S, 3) == "mode 'flat' -> 'pyramid' at 2 s"
-    assert [log.line((103 + k) * S, 1 + 2 * (k % 2)) for k in range(10)] == [None] * 10
-    assert log.line(170 * S, 1) == "mode 'pyramid' -> 'flat' at 70 s, after 10 changes that were not reported"
+    # nine changes within the minute, which end in the mode of the beginning
+    assert [log.line((103 + k) * S, 1 + 2 * (k % 2)) for k in range(9)] == [None] * 9
+    assert [log.line((120 + k) * S, 1) for k in range(42)] == [None] * 42
+    assert log.line(162 * S, 1) == "mode 'pyramid' -> 'flat' at 11 s, after 8 other changes"
+    assert log.line(163 * S, 1) is None
     assert log.line(300 * S, 7) == "mode 'flat' -> '7' at 200 s"
 
 
