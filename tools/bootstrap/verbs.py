@@ -24,6 +24,7 @@ VERBS = {
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
     "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_studies", "coverage"),
+    "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_studies", "reproduce"),
     "test": Verb("run ruff, mypy and all tests; arguments go to pytest"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
 }
