@@ -7,8 +7,11 @@ simulated seconds between which it does so. Kinds:
     dead            reads zero
     stuck VALUE     reads VALUE, whatever the light
     noisy SIGMA     reads right, with normal noise of standard deviation SIGMA on top
+
+Failures can be drawn too, so many for each case of a study: which cells, dead or stuck, and at which output.
 """
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -16,13 +19,24 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.kernel import kernel
-from css_common.random_streams import RandomKey, Stream, normal4
+from css_common.random_streams import RandomKey, Stream, normal4, uniform4
+from css_common.schema import Table, Values, choice, integer, real, texts
 
 FORM = "CELL dead|stuck VALUE|noisy SIGMA [from START] [to END]"
 DEAD, STUCK, NOISY = 0, 1, 2
 _KINDS = {"dead": DEAD, "stuck": STUCK, "noisy": NOISY}
 _LAST_STEP = 2**62
 
+# Draws of a case's failures, apart from those of noisy cells, whose index is the place of the fault.
+_FAILURES = 2**31
+
+PARAMETERS: Table = (
+    dataclasses.replace(texts("faults", (), f"failed cells, each {FORM}; times in s"), tunable=True),
+    integer("random_faults.count", 0, "-", "so many different cells, drawn for each case, fail", low=0, high=32),
+    choice("random_faults.kind", "dead", ("dead", "stuck", "mixed"), "how they fail; mixed: either, equally likely"),
+    real("random_faults.value", -1.0, "-", "output of stuck ones; below 0: uniform from 0 to 1", low=-1.0, high=10.0),
+    real("random_faults.time", 0.0, "s", "when they fail", low=0.0, high=1e9),
+)
 
 FAULT = np.dtype(
     [
@@ -34,6 +48,8 @@ FAULT = np.dtype(
     ],
     align=True,
 )
+
+NO_FAULTS = np.zeros(0, FAULT)
 
 
 class Fault(NamedTuple):
@@ -52,7 +68,7 @@ def parse_fault(text: str) -> Fault:
     Raises:
         ValueError: the text has another form.
     """
-    expected = ValueError(f"{text!r} is no fault, expected CELL dead|stuck VALUE|noisy SIGMA [from START] [to END]")
+    expected = ValueError(f"{text!r} is no fault, expected {FORM}")
     words = text.split()
     if len(words) < 2 or not words[0].isdecimal() or words[1] not in _KINDS:
         raise expected
@@ -70,26 +86,55 @@ def parse_fault(text: str) -> Fault:
     return Fault(cell, kind, value, start_s, end_s)
 
 
-def cell_faults(fault_texts: list[str], period_s: float) -> np.ndarray:
-    """Array of FAULT, in the order given: a later one acts on what an earlier one left.
+def drawn_faults(values: Values, key: RandomKey) -> list[Fault]:
+    """Faults of `random_faults.count` different cells, each set of cells equally likely, at most one for each cell.
+
+    A case with more failures has those of the case with fewer among them.
 
     Args:
-        fault_texts: one fault each.
-        period_s: control cycle [s], by which times become cycles.
+        values: checked ones (`PARAMETERS` and the mission's `cells`).
+    """
+    p = values.random_faults
+    healthy = list(range(len(values.cells.normals)))
+    faults = []
+    for k in range(min(p.count, len(healthy))):
+        which, kind, value, _ = uniform4(key, Stream.CELL_FAILURE, 0, _FAILURES + k)
+        cell = healthy.pop(int(which * len(healthy)))
+        if p.kind == "dead" or (p.kind == "mixed" and kind < 0.5):
+            faults.append(Fault(cell, DEAD, 0.0, p.time, math.inf))
+        else:
+            faults.append(Fault(cell, STUCK, p.value if p.value >= 0.0 else value, p.time, math.inf))
+    return faults
+
+
+def case_faults(values: Values, key: RandomKey) -> np.ndarray:
+    """Array (F,) of FAULT of one case: the faults of the mission, then those drawn. F is the same for all cases.
+
+    A later fault acts on what an earlier one left.
+
+    Args:
+        values: checked ones (`PARAMETERS`, the mission and its cells).
+
+    Raises:
+        ValueError: a fault's text has another form.
     """
 
     def step(time_s: float) -> int:
         # a fault begins with the first cycle at or after its time; the slack is for times like 0.3 / 0.1
-        return _LAST_STEP if math.isinf(time_s) else math.ceil(time_s / period_s - 1e-6)
+        return _LAST_STEP if math.isinf(time_s) else math.ceil(time_s / values.mission.period - 1e-6)
 
-    faults = [parse_fault(text) for text in fault_texts]
+    faults = [parse_fault(text) for text in values.faults] + drawn_faults(values, key)
     rows = [(f.cell, f.kind, f.value, step(f.start_s), step(f.end_s)) for f in faults]
     return np.array(rows, dtype=FAULT)
 
 
-def conflicts(fault_texts: list[str], cell_count: int) -> Iterator[str]:
-    """What is wrong with the faults of a mission with so many cells, one message each."""
-    for text in fault_texts:
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values, one message each."""
+    cell_count = len(values.cells.normals)
+    failing = values.random_faults.count
+    if failing > cell_count:
+        yield f"random_faults.count: {failing} given, expected at most the number of cells, {cell_count}"
+    for text in values.faults:
         try:
             fault = parse_fault(text)
         except ValueError as error:
@@ -101,7 +146,12 @@ def conflicts(fault_texts: list[str], cell_count: int) -> Iterator[str]:
 
 @kernel
 def apply_faults(faults, key: RandomKey, step: int, voltages) -> None:
-    """Change the outputs of the cells that have failed at this control cycle."""
+    """Change the outputs of the cells that have failed at this control cycle.
+
+    Args:
+        faults: (F,) of FAULT.
+        voltages: (N,) outputs [-], changed.
+    """
     for k in range(faults.shape[0]):
         fault = faults[k]
         i = fault.cell

@@ -16,18 +16,15 @@ f is the solar flux relative to 1 AU times the visible fraction of the solar dis
 cell, s the Sun in the body frame. Outputs are normalised: 1.0 is the Sun at normal incidence at 1 AU.
 """
 
-import dataclasses
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Table, Values, choice, flag, integer, real, texts
+from css_common.schema import Table, Values, choice, flag, integer, real
 from css_common.vectors import Vec3
 from css_environment.albedo import Screen, transmission
-from css_sim.cell_faults import FORM, apply_faults, cell_faults
+from css_sim.cell_faults import apply_faults
 from css_sim.cell_screen import screen
 
 PARAMETERS: Table = (
@@ -39,12 +36,11 @@ PARAMETERS: Table = (
     real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0),
     real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0),
     integer("bits", 0, "-", "resolution between lowest and highest output; 0: continuous", low=0, high=32),
-    dataclasses.replace(texts("faults", (), f"failed cells, each {FORM}; times in s"), tunable=True),
 )
 
 
 class SunCells(NamedTuple):
-    """What all cells have in common; what differs from cell to cell is in `cell_errors.CELL`."""
+    """What all cells have in common in all cases; what differs is in `cell_errors.CELL` and `cell_faults.FAULT`."""
 
     screen: Screen  # what hides part of the sky
     cos_half_view: float
@@ -56,11 +52,10 @@ class SunCells(NamedTuple):
     output_low: float
     output_high: float
     levels: float  # steps between lowest and highest output; 0: continuous
-    faults: np.ndarray  # (F,) of cell_faults.FAULT
 
 
 def parameters(values: Values) -> SunCells:
-    """Parameters of `sample` from checked values (`PARAMETERS`, the mission and its cells)."""
+    """Parameters of `sample` from checked values (`PARAMETERS`, `cell_screen.PARAMETERS` and the mission's `cells`)."""
     return SunCells(
         screen=screen(values),
         cos_half_view=math.cos(math.radians(0.5 * values.cells.field_of_view_deg)),
@@ -72,7 +67,6 @@ def parameters(values: Values) -> SunCells:
         output_low=values.output_low,
         output_high=values.output_high,
         levels=float(2**values.bits) if values.bits else 0.0,
-        faults=cell_faults(values.faults, values.mission.period),
     )
 
 
@@ -135,6 +129,7 @@ def _limit(p: SunCells, voltages) -> int:
 def sample(
     p: SunCells,
     cells,
+    faults,
     key: RandomKey,
     step: int,
     sun_b: Vec3,
@@ -146,6 +141,7 @@ def sample(
 
     Args:
         cells: (N,) of `cell_errors.CELL`.
+        faults: (F,) of `cell_faults.FAULT`.
         step: number of the control cycle, which with `key` fixes all draws.
         sun_b: unit vector to the Sun.
         intensity: solar flux relative to 1 AU times the visible fraction of the disc [-].
@@ -167,6 +163,6 @@ def sample(
         voltages_out[i] = cell.gain * v * voltages_out[i] + cell.bias
     if p.noise > 0.0:
         _add_noise(p.noise, key, step, voltages_out)
-    if p.faults.shape[0] > 0:
-        apply_faults(p.faults, key, step, voltages_out)
+    if faults.shape[0] > 0:
+        apply_faults(faults, key, step, voltages_out)
     return _limit(p, voltages_out)

@@ -169,10 +169,28 @@ def test_faults_can_be_set_in_flight():
     assert voltages[0] == 0.7 and voltages[3] == 0.0
 
 
+def test_drawn_failures_are_those_of_the_case_and_stay_when_faults_are_set_in_flight():
+    messages = truths(2)
+    random_faults = {"random_faults__count": 2, "random_faults__kind": "stuck", "random_faults__value": 0.33}
+    failed = []
+    for case in range(6):
+        array = build(CssArray, mission__case=case, **random_faults)
+        failed.append(outputs(array, messages[:1], "voltages")[0].voltages == 0.33)
+        given = {name.replace("__", "."): v for name, v in random_faults.items()} | {"mission.case": case}
+        given["faults"] = ["0 stuck 0.7", "1 stuck 0.7", "2 stuck 0.7"]
+        array.tune(shaped_values(CssArray.table(), checked_values(CssArray.table(), given)))
+        voltages = outputs(array, messages[1:], "voltages")[0].voltages
+        assert np.array_equal(voltages == 0.33, failed[-1])
+        assert np.all(voltages[:3][~failed[-1][:3]] == 0.7)
+    assert all(np.count_nonzero(cells) == 2 for cells in failed)
+    assert len({tuple(cells) for cells in failed}) > 1
+
+
 @pytest.mark.parametrize(
     ("kind", "given", "message"),
     [
         (CssArray, {"faults": ["9 dead"]}, "expected a cell from 0 to 7"),
+        (CssArray, {"random_faults.count": 9}, "random_faults.count: 9 given, expected at most"),
         (CssArray, {"output_low": 1.0, "output_high": 0.5}, "output_low: 1"),
         (CssArray, {"collar.cells": [1]}, "collar.cells"),
         (CssArray, {"albedo.reflectivity": "file"}, "albedo.mean_file"),

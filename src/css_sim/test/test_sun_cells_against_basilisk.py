@@ -17,7 +17,7 @@ from css_common.random_streams import random_key
 from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_common.vectors import multiply
-from css_sim import cell_errors, cell_screen, sun_cells
+from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "coarse_sun_sensor.json").read_text())
 CASES = [case for case in REFERENCE["cases"] if case["kellyFactor"] == 0.0]
@@ -26,7 +26,7 @@ CASES = [case for case in REFERENCE["cases"] if case["kellyFactor"] == 0.0]
 def outputs(case, faults=()):
     """Our output for a Basilisk case."""
     values = default_values(
-        MISSION + CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS,
+        MISSION + CELLS + sun_cells.PARAMETERS + cell_faults.PARAMETERS + cell_screen.PARAMETERS,
         cells__normals=case["nHat_B"],
         cells__field_of_view_deg=min(180.0, math.degrees(2.0 * case["fov"])),
         cells__clip_normal=[0.0, 0.0, 0.0],
@@ -45,8 +45,9 @@ def outputs(case, faults=()):
     np.testing.assert_allclose(sun_b, case["sHat_B"], atol=1e-15)
     intensity = case["illuminationFactor"] * (REFERENCE["AU_m"] / distance) ** 2
     voltage = np.zeros(1)
+    key = random_key(1, 0)
     sun_cells.sample(
-        sun_cells.parameters(values), cells, random_key(1, 0), 0, sun_b, intensity,
+        sun_cells.parameters(values), cells, cell_faults.case_faults(values, key), key, 0, sun_b, intensity,
         np.array([case["albedo"]]), voltage,
     )  # fmt: skip
     return voltage[0]

@@ -11,6 +11,7 @@ from css_common.random_streams import random_key
 from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_sim import cell_errors, cell_screen, sun_cells
+from css_sim.cell_faults import NO_FAULTS
 
 KEY = random_key(1, 0)
 PLAIN = {"warp": False, "degradation": 0.0}
@@ -18,7 +19,7 @@ PLAIN = {"warp": False, "degradation": 0.0}
 
 def build(**changes):
     """Parameters and nominal cells of the paper's spacecraft."""
-    values = default_values(MISSION + CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS, **changes)
+    values = default_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS, **changes)
     return sun_cells.parameters(values), cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
 
 
@@ -27,12 +28,12 @@ def read(p, cells, sun_b, intensity=1.0, albedo=None, step=0):
     voltages = np.zeros(len(cells))
     albedo = np.zeros(len(cells)) if albedo is None else albedo
     sun_b = tuple(float(x) for x in sun_b)
-    mask = sun_cells.sample(p, cells, KEY, step, sun_b, intensity, albedo, voltages)
+    mask = sun_cells.sample(p, cells, NO_FAULTS, KEY, step, sun_b, intensity, albedo, voltages)
     return voltages, mask
 
 
 @numba.njit
-def lit_fractions(p, cells, key):
+def lit_fractions(p, cells, faults, key):
     """Fractions of the sphere that 0, 1, 2, ... cells see, at cell centres of a 720 x 1440 grid."""
     fractions = np.zeros(9)
     voltages, dark = np.zeros(8), np.zeros(8)
@@ -45,20 +46,20 @@ def lit_fractions(p, cells, key):
                 math.sin(polar) * math.sin(azimuth),
                 math.cos(polar),
             )
-            sun_cells.sample(p, cells, key, 0, sun_b, 1.0, dark, voltages)
+            sun_cells.sample(p, cells, faults, key, 0, sun_b, 1.0, dark, voltages)
             fractions[np.count_nonzero(voltages)] += math.sin(polar)
     return fractions / fractions.sum()
 
 
 def test_coverage_of_the_sphere():
     # Fig. 1b; the numbers come from an independent program on the same grid, to the digits given
-    fractions = lit_fractions(*build(**PLAIN), KEY)
+    fractions = lit_fractions(*build(**PLAIN), NO_FAULTS, KEY)
     np.testing.assert_allclose(fractions[:5], [0, 0.3508, 0.5145, 0.0938, 0.0408], atol=5.1e-5)
     assert np.all(fractions[5:] == 0)
 
 
 def test_coverage_without_the_body_plane():
-    fractions = lit_fractions(*build(**PLAIN, cells__clip_normal=[0.0, 0.0, 0.0]), KEY)
+    fractions = lit_fractions(*build(**PLAIN, cells__clip_normal=[0.0, 0.0, 0.0]), NO_FAULTS, KEY)
     np.testing.assert_allclose(fractions[:5], [0, 0.1753, 0.6900, 0.0938, 0.0408], atol=5.1e-5)
     # closed form: eight cones of 60 deg half angle cover (1 - cos 60 deg) / 2 of the sphere each
     assert fractions @ np.arange(9) == pytest.approx(8 * 0.25, abs=2e-4)

@@ -9,8 +9,9 @@ from scipy import stats
 
 from css_common.random_streams import random_key
 from css_common.schema import default_values
-from css_common.sections import CELLS, MISSION
+from css_common.sections import CELLS
 from css_sim import cell_errors, cell_screen, sun_cells
+from css_sim.cell_faults import NO_FAULTS
 
 SIGNIFICANCE = 1e-4
 STEPS = 20_000
@@ -22,7 +23,7 @@ def build(**changes):
     """Parameters, error statistics and nominal cells."""
     changes = {"warp": False, "degradation": 0.0, "output_low": -10.0, "output_high": 10.0} | changes
     values = default_values(
-        MISSION + CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS, **changes
+        CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS, **changes
     )
     nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
     return sun_cells.parameters(values), cell_errors.error_model(values), nominal
@@ -32,7 +33,7 @@ def record(p, cells, steps, key=KEY):
     """Outputs (len(steps), 8) in the dark with equal albedo on all cells."""
     out = np.zeros((len(steps), 8))
     for k, step in enumerate(steps):
-        sun_cells.sample(p, cells, key, step, (0.0, 0.0, 1.0), 0.0, LIGHT, out[k])
+        sun_cells.sample(p, cells, NO_FAULTS, key, step, (0.0, 0.0, 1.0), 0.0, LIGHT, out[k])
     return out
 
 
@@ -82,7 +83,7 @@ def test_noise_is_white_normal_and_independent_between_cells():
     assert np.abs(correlation).max() < stats.norm.isf(SIGNIFICANCE / 28 / 2) / math.sqrt(STEPS)
 
 
-@pytest.mark.parametrize("changes", [{"noise": 0.02}, {"degradation": 0.05}, {"faults": ["3 noisy 0.1"]}])
+@pytest.mark.parametrize("changes", [{"noise": 0.02}, {"degradation": 0.05}])
 def test_draws_do_not_depend_on_the_order_of_steps(changes):
     p, _, cells = build(**changes)
     steps = np.random.default_rng(1).permutation(200)

@@ -24,7 +24,7 @@ from css_estimation.cell_layout import CellLayout, brightest
 from css_estimation.nodes.wavg import Wavg
 from css_sim import sun_cells
 from css_sim.cell_errors import nominal_cells
-from css_sim.cell_faults import cell_faults
+from css_sim.cell_faults import NO_FAULTS
 from css_sim.cell_screen import cell_sides
 from css_sim.nodes.css_array import CssArray
 from css_sim.sun_cells import SunCells, sample
@@ -92,7 +92,6 @@ def layout_of(cell_values: Values, average_values: Values) -> Layout:
         output_low=0.0,
         output_high=math.inf,
         levels=0.0,
-        faults=cell_faults([], cell_values.mission.period),
     )
     cells = nominal_cells(cell_values.cells.normals, cell_sides(cell_values))
     average = wavg.parameters(average_values)
@@ -113,12 +112,12 @@ def map_cells(layout: Layout, grid: Grid, warp: bool = False) -> CellMap:
     """The map of a layout, for cells with an ideal cosine or with the flattened response of Eq. 16 (`warp`)."""
     shape = (len(grid.polar), len(grid.azimuth))
     result = CellMap(np.zeros(shape, dtype=np.int64), np.zeros(shape))
-    _map(layout._replace(chain=layout.chain._replace(warp=warp)), random_key(0, 0), grid, *result)
+    _map(layout._replace(chain=layout.chain._replace(warp=warp)), NO_FAULTS, random_key(0, 0), grid, *result)
     return result
 
 
 @kernel
-def _map(layout: Layout, key: RandomKey, grid: Grid, seen_by_out, error_out) -> None:
+def _map(layout: Layout, faults, key: RandomKey, grid: Grid, seen_by_out, error_out) -> None:
     count = layout.cells.shape[0]
     albedo = np.zeros(count)
     voltages = np.zeros(count)
@@ -127,7 +126,7 @@ def _map(layout: Layout, key: RandomKey, grid: Grid, seen_by_out, error_out) -> 
         for j in range(grid.azimuth.shape[0]):
             at = (across * math.cos(grid.azimuth[j]), across * math.sin(grid.azimuth[j]), along)
             sun_b = multiply_transposed(grid.axes, at)
-            sample(layout.chain, layout.cells, key, 0, sun_b, 1.0, albedo, voltages)
+            sample(layout.chain, layout.cells, faults, key, 0, sun_b, 1.0, albedo, voltages)
             for k in range(count):
                 if voltages[k] > 0.0:
                     seen_by_out[i, j] += 1

@@ -26,6 +26,7 @@ class CssArray(Component):
     shared = ("cells",)
     parameters = (
         *sun_cells.PARAMETERS,
+        *cell_faults.PARAMETERS,
         *cell_errors.PARAMETERS,
         *cell_screen.PARAMETERS,
         *earth_reflectivity.PARAMETERS,
@@ -42,7 +43,7 @@ class CssArray(Component):
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
-        yield from cell_faults.conflicts(values.faults, len(values.cells.normals))
+        yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
         yield from earth_reflectivity.conflicts(values)
         if values.output_low >= values.output_high:
@@ -52,6 +53,7 @@ class CssArray(Component):
         values = self.values
         self._key = random_key(values.mission.seed, values.mission.case)
         self._p = sun_cells.parameters(values)
+        self._faults = cell_faults.case_faults(values, self._key)
         nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
         self._cells = nominal.copy()
         cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, self._cells)
@@ -68,7 +70,7 @@ class CssArray(Component):
 
     def tune(self, values: Values) -> None:
         super().tune(values)
-        self._p = sun_cells.parameters(values)
+        self._faults = cell_faults.case_faults(values, self._key)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
@@ -86,6 +88,7 @@ class CssArray(Component):
         saturated = self._sample(
             self._p,
             self._cells,
+            self._faults,
             self._key,
             self.step_of(stamp_ns),
             self._turn(dcm_bn, sun_n),
