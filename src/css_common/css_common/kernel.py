@@ -69,8 +69,45 @@ def _use_cache_folder() -> None:
 
 _use_cache_folder()
 
-kernel = numba.njit(cache=True, error_model="numpy", fastmath=False)
-"""Compiles a pure function on scalars, tuples and small arrays; `kernel_function.py_func` is the plain Python."""
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": False}
+_UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
+
+
+def kernel(function: Callable[..., Any]) -> Any:
+    """Compiles a pure function on scalars, tuples and small arrays; `kernel_function.py_func` is the plain Python.
+
+    Arrays that go in are not counted as references: counting costs as much as the arithmetic of a whole control
+    cycle. A kernel can therefore make no array, and must return none (its owner would free it twice); it writes into
+    those that it is given.
+
+    Raises:
+        TypeError: at the first call, when the function returns an array.
+    """
+    dispatcher: Any = numba.njit(**_UNCOUNTED)(function)
+    if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
+        return dispatcher
+    compile_types = dispatcher.compile
+
+    def compile_checked(signature: Any) -> Any:
+        entry = compile_types(signature)
+        for compiled in dispatcher.overloads.values():
+            if _holds_array(compiled.signature.return_type):
+                raise TypeError(f"{function.__qualname__}: a kernel must not return an array; let it write into one")
+        return entry
+
+    dispatcher.compile = compile_checked
+    return dispatcher
+
+
+outer_kernel = numba.njit(**_OPTIONS, nogil=True)
+"""Compiles the outermost loops of a study: they may make and return arrays, and other threads go on meanwhile."""
+
+
+def _holds_array(numba_type: Any) -> bool:
+    if isinstance(numba_type, numba.types.BaseTuple):
+        members: Any = numba_type
+        return any(map(_holds_array, members.types))
+    return isinstance(numba_type, (numba.types.Array, numba.types.Record))
 
 
 def typed_call(function: Callable[..., Any]) -> Callable[..., Any]:

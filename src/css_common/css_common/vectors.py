@@ -64,6 +64,21 @@ def angle_between(a: Vec3, b: Vec3) -> float:
 
 
 @kernel
+def axes_across(direction: Vec3) -> tuple[Vec3, Vec3]:
+    """Two unit vectors that make a right-handed orthogonal triad with a unit vector: (e1, e2, direction)."""
+    x, y, z = abs(direction[0]), abs(direction[1]), abs(direction[2])
+    # the coordinate axis farthest from the direction gives a safe cross product
+    if x <= y and x <= z:
+        farthest = (1.0, 0.0, 0.0)
+    elif y <= z:
+        farthest = (0.0, 1.0, 0.0)
+    else:
+        farthest = (0.0, 0.0, 1.0)
+    e1 = unit(cross(farthest, direction))
+    return e1, cross(direction, e1)
+
+
+@kernel
 def row(a, i: int) -> Vec3:
     """Row `i` of an (N, 3) array as a vector."""
     return (a[i, 0], a[i, 1], a[i, 2])

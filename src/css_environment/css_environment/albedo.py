@@ -111,12 +111,14 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
         work: room from `new_workspace`.
         output: (N,) written.
     """
+    if light[DISC + DISC_LIGHT] <= 0.0:
+        for i in range(output.shape[0]):
+            output[i] = 0.0
+        return
     nadir_n = (float(light[DISC]), float(light[DISC + 1]), float(light[DISC + 2]))
     sin_half_view = math.sqrt(max(0.0, 1.0 - cos_half_view * cos_half_view))
     # Cells that look away from nadir by more than half their view and half the Earth's see nothing of it.
     reach_cos = cos_half_view * light[DISC + DISC_COS] - sin_half_view * light[DISC + DISC_SIN]
-    if light[DISC + DISC_LIGHT] <= 0.0:
-        reach_cos = 2.0
     edge_sin = max(_NARROWEST_SIN, sin_half_view)
 
     # What passes the screen to cells on either side. All loops over patches stand in this one function: apart, each

@@ -158,7 +158,7 @@ def look_at_earth(
 @kernel
 def gather_light(view: EarthView, reflectivity, light) -> None:
     """Second half of `albedo_sources`: samples, weighed with the reflectivities of one case, summed to patches."""
-    values = reflectivity.ravel()
+    values = reflectivity.reshape(-1)
     total = 0.0
     for i in range(3):
         light[DISC + i] = -view.frame[2, i]

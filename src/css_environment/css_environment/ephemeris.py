@@ -101,13 +101,6 @@ def build_ephemeris(
 
 
 @kernel
-def covers(ephemeris: Ephemeris, elapsed_s: float) -> bool:
-    """True when the tables hold the instant `elapsed_s` [s after the epoch]."""
-    last = ephemeris.start_s + ephemeris.step_s * (ephemeris.r_n.shape[0] - 1)
-    return ephemeris.start_s <= elapsed_s <= last
-
-
-@kernel
 def at(ephemeris: Ephemeris, elapsed_s: float) -> EnvironmentState:
     """Environment `elapsed_s` seconds after the epoch; outside the tables the end interval is extrapolated.
 

@@ -50,15 +50,16 @@ class MissionEnvironment:
         self._field = field
         self._conical_shadow = conical_shadow
         self._tables: Ephemeris | None = None
-        self._covers, self._at = typed_call(ephemeris.covers), typed_call(ephemeris.at)
+        self._at = typed_call(ephemeris.at)
 
     def tables(self, elapsed_s: float) -> Ephemeris:
         """Tables that hold an instant [s after the epoch]."""
-        if self._tables is None or not self._covers(self._tables, elapsed_s):
+        start_s = ephemeris.segment_start(elapsed_s)
+        if self._tables is None or self._tables.start_s != start_s:
             self._tables = _segment_tables(
                 self._orbit,
                 self._epoch_ns,
-                ephemeris.segment_start(elapsed_s),
+                start_s,
                 field=self._field,
                 conical_shadow=self._conical_shadow,
             )

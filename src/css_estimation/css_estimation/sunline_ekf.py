@@ -27,6 +27,8 @@ from css_common.schema import Table, Values, choice, real
 from css_common.vectors import Vec3
 from css_estimation import sun_tracking
 from css_estimation.cell_layout import READABLE, CellLayout, brightest, cell_layout, sees
+from css_estimation.lit_cells import Gate
+from css_estimation.snapshot import MODE_NO_SUN
 from css_estimation.sun_heading import NO_COVARIANCE, RATE_NONE, SunHeading
 from css_estimation.sun_tracking import (
     Estimate,
@@ -38,7 +40,7 @@ from css_estimation.sun_tracking import (
 )
 from css_estimation.sunline_filter import constrain, propagate, update_cell
 from css_estimation.symmetric import Symmetric, isotropic, row_major, trace
-from css_estimation.wavg import MODE_NO_SUN, Gate, weighted_average
+from css_estimation.wavg import weighted_average
 
 PARAMETERS: Table = (
     real(

@@ -4,8 +4,10 @@
 What is stored once cannot become unsymmetric by rounding.
 """
 
+import math
+
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, dot
+from css_common.vectors import Mat3, Vec3, add, dot, scale, subtract
 
 Symmetric = tuple[float, float, float, float, float, float]
 
@@ -83,3 +85,53 @@ def congruence(m: Mat3, p: Symmetric) -> Symmetric:
 def row_major(p: Symmetric) -> tuple[float, float, float, float, float, float, float, float, float]:
     """All nine elements, row by row."""
     return (p[0], p[1], p[2], p[1], p[3], p[4], p[2], p[4], p[5])
+
+
+@kernel
+def _rotation(pp: float, qq: float, pq: float) -> tuple[float, float, float]:
+    """Tangent, cosine and sine of the smaller rotation that makes the off-diagonal element pq zero."""
+    if pq == 0.0:
+        return 0.0, 1.0, 0.0
+    theta = 0.5 * (qq - pp) / pq
+    t = math.copysign(1.0, theta) / (abs(theta) + math.sqrt(1.0 + theta * theta))
+    c = 1.0 / math.sqrt(1.0 + t * t)
+    return t, c, t * c
+
+
+@kernel
+def _rotated(c: float, s: float, u: Vec3, v: Vec3) -> tuple[Vec3, Vec3]:
+    return subtract(scale(c, u), scale(s, v)), add(scale(s, u), scale(c, v))
+
+
+# Convergence is quadratic: four sweeps leave rounding in any 3 x 3 matrix, two more are a reserve.
+_SWEEPS = 6
+
+
+@kernel
+def eigen(p: Symmetric) -> tuple[Vec3, Mat3]:
+    """Eigenvalues, largest first, and their orthonormal eigenvectors as rows.
+
+    Cyclic Jacobi rotations (Golub & Van Loan, Matrix Computations, section 8.5): accurate for equal and for tiny
+    eigenvalues too.
+    """
+    xx, xy, xz, yy, yz, zz = p
+    u, v, w = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    for _ in range(_SWEEPS):
+        t, c, s = _rotation(xx, yy, xy)
+        xx, yy, xy, xz, yz = xx - t * xy, yy + t * xy, 0.0, c * xz - s * yz, s * xz + c * yz
+        u, v = _rotated(c, s, u, v)
+        t, c, s = _rotation(xx, zz, xz)
+        xx, zz, xz, xy, yz = xx - t * xz, zz + t * xz, 0.0, c * xy - s * yz, s * xy + c * yz
+        u, w = _rotated(c, s, u, w)
+        t, c, s = _rotation(yy, zz, yz)
+        yy, zz, yz, xy, xz = yy - t * yz, zz + t * yz, 0.0, c * xy - s * xz, s * xy + c * xz
+        v, w = _rotated(c, s, v, w)
+        if xy == 0.0 and xz == 0.0:
+            break
+    if xx < yy:
+        xx, yy, u, v = yy, xx, v, u
+    if yy < zz:
+        yy, zz, v, w = zz, yy, w, v
+    if xx < yy:
+        xx, yy, u, v = yy, xx, v, u
+    return (xx, yy, zz), (u, v, w)

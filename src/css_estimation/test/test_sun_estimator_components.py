@@ -12,10 +12,11 @@ from css_common.schema import checked_values, shaped_values
 from css_estimation.messages import gyro_reading
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.nodes.wavg import Wavg
+from css_estimation.nodes.wls import Wls
 from css_estimation.sun_heading import RATE_GYRO, RATE_SUN
 from css_msgs.msg import CssVoltages, SunEstimate
 
-KINDS = pytest.mark.parametrize("kind", [Wavg, Ekf])
+KINDS = pytest.mark.parametrize("kind", [Wavg, Wls, Ekf])
 LIT = np.array([0.8, 0.7, 0.5, 0.55, 0.0, 0.0, 0.0, 0.0])
 OMEGA = np.array([0.01, 0.0, -0.02])
 

@@ -10,10 +10,14 @@ from hypothesis import strategies as st
 
 from css_common.schema import default_values
 from css_common.sections import CELLS
-from css_estimation import sunline_ekf, wavg
+from css_estimation import least_squares, sunline_ekf, wavg
 from css_estimation.sun_heading import VALIDITY_NONE, VALIDITY_VALID
 
-ESTIMATORS = pytest.mark.parametrize("estimator", [wavg, sunline_ekf], ids=["wavg", "ekf"])
+ESTIMATORS = pytest.mark.parametrize(
+    ("estimator", "options"),
+    [(wavg, {}), (least_squares, {}), (least_squares, {"use_dark_cells": True}), (sunline_ekf, {})],
+    ids=["wavg", "wls", "wls with dark cells", "ekf"],
+)
 rng = np.random.default_rng(7)
 
 
@@ -61,8 +65,8 @@ cycle = st.tuples(
 @ESTIMATORS
 @settings(max_examples=150, deadline=None)
 @given(cycles=st.lists(cycle, min_size=1, max_size=12), count=st.sampled_from([1, 2, 8, 32]))
-def test_any_sequence(estimator, cycles, count):
-    p, state = build(estimator, count, eclipse__source="both")
+def test_any_sequence(estimator, options, cycles, count):
+    p, state = build(estimator, count, eclipse__source="both", **options)
     for voltages, gyro_b, gyro_valid, dt, predicted in cycles:
         state, heading = estimator.step(p, state, dt, np.array(voltages[:count]), gyro_b, gyro_valid, predicted)
         assert_sane(heading)
@@ -71,8 +75,8 @@ def test_any_sequence(estimator, cycles, count):
 @ESTIMATORS
 @pytest.mark.parametrize("count", [1, 2, 8, 32])
 @pytest.mark.parametrize("level", [0.0, 1e-300, 0.5, 1.0, 1e30, 1e90, 1e200])
-def test_all_outputs_equal(estimator, count, level):
-    p, state = build(estimator, count)
+def test_all_outputs_equal(estimator, options, count, level):
+    p, state = build(estimator, count, **options)
     for _ in range(50):
         state, heading = estimator.step(p, state, 0.1, np.full(count, level), (0.0, 0.0, 0.01), True, -1)
         assert_sane(heading)
@@ -80,9 +84,9 @@ def test_all_outputs_equal(estimator, count, level):
 
 
 @ESTIMATORS
-def test_one_dead_reading_costs_one_cell(estimator):
+def test_one_dead_reading_costs_one_cell(estimator, options):
     """A NaN is a dark cell: the heading comes from the others."""
-    p, state = build(estimator, 8)
+    p, state = build(estimator, 8, **options)
     voltages = np.maximum(np.array(LAYOUTS[8]).reshape(8, 3) @ (0.0, 0.6, 0.8), 0.0)
     voltages[np.argmin(voltages)] = math.nan
     for _ in range(100):
@@ -93,7 +97,7 @@ def test_one_dead_reading_costs_one_cell(estimator):
 
 
 @ESTIMATORS
-def test_32_cells_use_the_whole_mask(estimator):
-    p, state = build(estimator, 32)
+def test_32_cells_use_the_whole_mask(estimator, options):
+    p, state = build(estimator, 32, **options)
     _, heading = estimator.step(p, state, 0.1, np.ones(32), (0.0, 0.0, 0.0), True, -1)
     assert heading.lit_mask == 2**32 - 1

@@ -9,17 +9,15 @@ import math
 
 import numpy as np
 import pytest
+from ideal_cells import AZIMUTH, POLAR, WEIGHT, direction, ideal_outputs, percent_of_sphere
 
 from css_common.kernel import kernel
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
 from css_estimation import wavg
-from css_estimation.cell_layout import brightest, cell_layout, sees
-
-POLAR = (np.arange(720) + 0.5) * math.pi / 720
-AZIMUTH = (np.arange(1440) + 0.5) * 2.0 * math.pi / 1440
-WEIGHT = np.sin(POLAR) / np.sin(POLAR).sum()  # of a row of the map
+from css_estimation.cell_layout import brightest, cell_layout
+from css_estimation.snapshot import MODE_NO_SUN
 
 
 def wavg_parameters(**changes):
@@ -31,21 +29,8 @@ def map_of_sphere(layout, gate, polar, azimuth, warp, scale, voltages, error, se
     """Error [rad] of the weighted average and number of cells that see the Sun, for each Sun direction."""
     for a in range(polar.size):
         for b in range(azimuth.size):
-            s = (
-                math.sin(polar[a]) * math.cos(azimuth[b]),
-                math.sin(polar[a]) * math.sin(azimuth[b]),
-                math.cos(polar[a]),
-            )
-            for i in range(voltages.size):
-                cell = layout.cells[i]
-                v = 0.0
-                if sees(layout, i, s):
-                    seen[a, b] += 1
-                    v = cell.nx * s[0] + cell.ny * s[1] + cell.nz * s[2]
-                    if warp:
-                        b2 = 1.0 - v * v
-                        v *= 1.0 + 0.5 * b2 - 0.65 * b2 * b2
-                voltages[i] = scale * v
+            s = direction(polar[a], azimuth[b])
+            seen[a, b] = ideal_outputs(layout, s, warp, scale, voltages)
             s_hat, _, _ = wavg.weighted_average(layout, gate, voltages, brightest(voltages))
             error[a, b] = angle_between(s_hat, s)
 
@@ -66,10 +51,6 @@ def ideal():
 @pytest.fixture(scope="module")
 def warped():
     return error_map(warp=True)
-
-
-def percent_of_sphere(condition):
-    return 100.0 * (WEIGHT @ condition.mean(axis=1))
 
 
 def test_coverage_is_that_of_figure_1b(ideal):
@@ -190,7 +171,7 @@ def test_albedo_light_below_the_gate_has_no_effect():
 def test_modes():
     p = wavg_parameters()
     dark = np.zeros(8)
-    assert wavg.weighted_average(p.layout, p.gate, dark, brightest(dark)) == ((0.0, 0.0, 0.0), 0, wavg.MODE_NO_SUN)
+    assert wavg.weighted_average(p.layout, p.gate, dark, brightest(dark)) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
     single = dark.copy()
     single[3] = 0.6
     s_hat, mask, mode = wavg.weighted_average(p.layout, p.gate, single, brightest(single))
@@ -200,13 +181,13 @@ def test_modes():
     absolute = wavg_parameters(gate_kind="absolute", gate=0.4)
     dim = 0.5 * single
     assert wavg.weighted_average(absolute.layout, absolute.gate, dim, 3)[1:] == (1 << 3, wavg.MODE_BELOW_GATE)
-    assert wavg.weighted_average(absolute.layout, absolute.gate, 0.15 * single, 3)[2] == wavg.MODE_NO_SUN
+    assert wavg.weighted_average(absolute.layout, absolute.gate, 0.15 * single, 3)[2] == MODE_NO_SUN
 
 
 def test_normals_that_cancel_leave_no_direction():
     p = wavg_parameters(cells__normals=[1.0, 0.0, 0.0, -1.0, 0.0, 0.0], cells__clip_normal=[0.0, 0.0, 0.0])
     voltages = np.array([0.7, 0.7])
-    assert wavg.weighted_average(p.layout, p.gate, voltages, 0) == ((0.0, 0.0, 0.0), 0, wavg.MODE_NO_SUN)
+    assert wavg.weighted_average(p.layout, p.gate, voltages, 0) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
 
 
 def test_layout_of_the_default_mission_is_the_dual_pyramid():

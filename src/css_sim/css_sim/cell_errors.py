@@ -14,7 +14,7 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, normal_quantile, uniform4
 from css_common.schema import Table, Values, real
-from css_common.vectors import Vec3, add, cross, multiply_transposed, scale, unit
+from css_common.vectors import Vec3, add, axes_across, multiply_transposed, scale
 
 PARAMETERS: Table = (
     real("fixed_degradation", 0.0, "-", "largest lasting loss of a cell, uniform", low=0.0, high=1.0),
@@ -70,16 +70,7 @@ def nominal_cells(normals_b: np.ndarray, side: ArrayLike = 0.0) -> np.ndarray:
 @kernel
 def tilted(normal_b: Vec3, a: float, b: float) -> Vec3:
     """Unit vector after one rotation whose vector has parts a and b [rad] along two axes across `normal_b`."""
-    # the body axis farthest from the normal gives a safe cross product
-    x, y, z = abs(normal_b[0]), abs(normal_b[1]), abs(normal_b[2])
-    if x <= y and x <= z:
-        helper = (1.0, 0.0, 0.0)
-    elif y <= z:
-        helper = (0.0, 1.0, 0.0)
-    else:
-        helper = (0.0, 0.0, 1.0)
-    e1 = unit(cross(helper, normal_b))
-    e2 = cross(normal_b, e1)
+    e1, e2 = axes_across(normal_b)
     turn = rotation_vector_to_dcm(add(scale(a, e1), scale(b, e2)))
     return multiply_transposed(turn, normal_b)
 

@@ -21,7 +21,9 @@ from css_common.schema import Values
 from css_common.vectors import Mat3, Vec3, angle_between, mat3, multiply_transposed
 from css_estimation import wavg
 from css_estimation.cell_layout import CellLayout, brightest
+from css_estimation.lit_cells import Gate
 from css_estimation.nodes.wavg import Wavg
+from css_estimation.snapshot import MODE_NO_SUN
 from css_sim import sun_cells
 from css_sim.cell_errors import nominal_cells
 from css_sim.cell_faults import NO_FAULTS
@@ -75,7 +77,7 @@ class Layout(NamedTuple):
     chain: SunCells
     cells: np.ndarray  # (N,) of css_sim.cell_errors.CELL
     known: CellLayout
-    gate: wavg.Gate
+    gate: Gate
 
 
 def layout_of(cell_values: Values, average_values: Values) -> Layout:
@@ -132,4 +134,4 @@ def _map(layout: Layout, faults, key: RandomKey, grid: Grid, seen_by_out, error_
                     seen_by_out[i, j] += 1
             top = brightest(voltages)
             estimate_b, _, mode = wavg.weighted_average(layout.known, layout.gate, voltages, top)
-            error_out[i, j] = math.nan if mode == wavg.MODE_NO_SUN else angle_between(estimate_b, sun_b)
+            error_out[i, j] = math.nan if mode == MODE_NO_SUN else angle_between(estimate_b, sun_b)

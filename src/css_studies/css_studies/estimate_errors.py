@@ -3,6 +3,8 @@
 
 import numpy as np
 
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, axes_across, dot, multiply, row, subtract
 from css_msgs.msg import SunEstimate
 from css_studies.flight_log import FlightLog, angle
 
@@ -41,13 +43,25 @@ def tangent_nees(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
     rows, steps = estimated_rows(log, name)
     has_covariance = estimates.covariance[rows, 0] >= 0.0
     rows, steps = rows[has_covariance], steps[has_covariance]
-    sun_b = estimates.sun_b[rows]
-    covariance = estimates.covariance[rows].reshape(-1, 3, 3)
-    # two axes across each Sun line, from the body axis that is farthest from it
-    helper = np.eye(3)[np.argmin(np.abs(sun_b), axis=1)]
-    first = np.cross(helper, sun_b)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    axes = np.stack([first, np.cross(sun_b, first)], axis=1)  # (K, 2, 3)
-    error = np.einsum("kij,kj->ki", axes, log.sun_b[steps] - sun_b)
-    tangent = axes @ covariance @ axes.transpose(0, 2, 1)
-    return steps, np.einsum("ki,ki->k", error, np.linalg.solve(tangent, error[..., None])[..., 0])
+    nees = np.empty(len(rows))
+    _tangent_nees_of_rows(estimates.sun_b[rows], estimates.covariance[rows], log.sun_b[steps], nees)
+    return steps, nees
+
+
+@kernel
+def tangent_nees_of(sun_hat_b: Vec3, covariance, sun_b: Vec3) -> float:
+    """Normalised error squared of one estimate `sun_hat_b` with its covariance (nine, row-major), as `tangent_nees`."""
+    e1, e2 = axes_across(sun_hat_b)
+    c = covariance
+    p = ((c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8]))
+    p_e2 = multiply(p, e2)
+    p11, p12, p22 = dot(e1, multiply(p, e1)), dot(e1, p_e2), dot(e2, p_e2)
+    error = subtract(sun_b, sun_hat_b)
+    a, b = dot(e1, error), dot(e2, error)
+    return (p22 * a * a - 2.0 * p12 * a * b + p11 * b * b) / (p11 * p22 - p12 * p12)
+
+
+@kernel
+def _tangent_nees_of_rows(sun_hat_b, covariance, sun_b, nees_out) -> None:
+    for i in range(nees_out.shape[0]):
+        nees_out[i] = tangent_nees_of(row(sun_hat_b, i), covariance[i], row(sun_b, i))

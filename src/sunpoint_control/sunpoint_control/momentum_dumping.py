@@ -18,7 +18,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Table, Values, flag, real
-from css_common.vectors import Vec3, add, cross, dot, norm, row, scale, subtract, unit
+from css_common.vectors import Vec3, add, axes_across, cross, dot, norm, row, scale, subtract, unit
 from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
 
 PARAMETERS: Table = (
@@ -64,14 +64,7 @@ def rod_dipoles(rod_axes_b, torque_b: Vec3, field_b: Vec3, out) -> None:
     pseudo-inverse of the m columns a_j needs the inverse of a 2 x 2 matrix only.
     """
     b = unit(field_b)
-    smallest = min(abs(b[0]), min(abs(b[1]), abs(b[2])))
-    helper = (1.0, 0.0, 0.0)
-    if smallest == abs(b[1]):
-        helper = (0.0, 1.0, 0.0)
-    elif smallest == abs(b[2]):
-        helper = (0.0, 0.0, 1.0)
-    e1 = unit(cross(b, helper))
-    e2 = cross(b, e1)
+    e1, e2 = axes_across(b)
     m11 = m12 = m22 = 0.0
     for j in range(rod_axes_b.shape[0]):
         a = cross(row(rod_axes_b, j), field_b)

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Least-squares Sun heading."""
+
+from types import ModuleType
+from typing import ClassVar
+
+from css_common.run import node_main
+from css_estimation import least_squares
+from css_estimation.sun_estimator import SunEstimator
+
+
+class Wls(SunEstimator):
+    """Sun heading by weighted least squares, of least norm where the lit cells do not span space."""
+
+    algorithm: ClassVar[ModuleType] = least_squares
+    parameters = least_squares.PARAMETERS
+
+
+main = node_main(Wls)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

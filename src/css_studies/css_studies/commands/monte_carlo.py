@@ -1,0 +1,205 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies many cases of a mission in a compiled loop of the nodes' own algorithms.
+
+Each case draws its initial attitude and rates, sensor errors and whatever else the mission disperses; the
+configurations share their draws. A study that was interrupted goes on where it was when the same command is given
+again, and ends with the same bytes. `fly MISSION --case K` flies one of the cases on the real graph.
+"""
+
+import argparse
+import itertools
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.table import Table
+
+from css_common.mission import Mission, load_mission
+from css_common.mission_file import MissionError
+from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
+from css_studies.monte_carlo.schedulers import DaskScheduler
+from css_studies.monte_carlo.study_summary import study_object
+
+USAGE, INTERRUPTED = 2, 130
+
+_EPILOG = """examples:
+  monte-carlo okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off
+  monte-carlo okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2
+  monte-carlo okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786
+
+Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
+percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for.
+
+Exit code: 0 done, 2 something asked for is wrong, 130 interrupted."""
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="monte-carlo", description=__doc__, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
+    add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
+    add("--first-case", type=int, default=0, metavar="K", help="number of the first case (default: 0)")
+    add("--estimators", nargs="+", metavar="NAME", help="Sun estimators to fly (default: the mission's)")
+    add("--gyro", nargs="+", choices=("on", "off"), default=["on"], help="fly with the gyro, without, or both")
+    add("--duration", type=float, metavar="S", help="simulated time of a flight [s] (default: the mission's)")
+    add("--seed", type=int, metavar="N", help="key of all random streams (default: the mission's)")
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter")
+    add(
+        "--sweep",
+        action="append",
+        default=[],
+        metavar="KEY=V1,V2,...",
+        help="fly every value of a parameter; several sweeps combine",
+    )
+    add("--sample", type=float, default=1.0, metavar="S", help="time between percentiles [s] (default: %(default)s)")
+    add("--out", type=Path, metavar="DIR", help="folder of the study (default: studies/MISSION_TIME)")
+    add("--threads", type=int, metavar="N", help="flights at a time (default: one per processor)")
+    add("--scheduler", metavar="ADDRESS", help="dask scheduler to run on; local starts one on this machine")
+    add("--json", action="store_true", help="print the result as one JSON object on the last line")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    # a killed terminal or `kill` end it as Ctrl-C does: finished chunks stay
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        return _run(options)
+    except (MissionError, StudyError) as error:
+        print(f"monte-carlo: {error}", file=sys.stderr)
+        return USAGE
+    except KeyboardInterrupt:
+        print("monte-carlo: interrupted; the same command with the same --out goes on from here", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _run(options: argparse.Namespace) -> int:
+    _refuse_bad_numbers(options)
+    overrides = list(options.overrides)
+    if options.duration is not None:
+        overrides.append(f"mission.duration={options.duration}")
+    if options.seed is not None:
+        overrides.append(f"mission.seed={options.seed}")
+    mission = load_mission(options.mission, overrides)
+    configurations = _configurations(mission, options)
+    folder = options.out or _default_folder(mission.name)
+    messages = Console(stderr=True, highlight=False)
+    begin = time.perf_counter()
+    with _progress_bar(messages) as bar:
+        task = bar.add_task(mission.name, total=None)
+        study = run_study(
+            mission,
+            configurations,
+            options.cases,
+            folder,
+            first_case=options.first_case,
+            sample_s=options.sample,
+            threads=options.threads,
+            progress=lambda done, total: bar.update(task, completed=done, total=total),
+            scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
+        )
+    result = study_object(study, time.perf_counter() - begin, time.process_time())
+    print_study(study, result, Console(highlight=False))
+    if options.json:
+        print(json.dumps(result, allow_nan=False))
+    return 0
+
+
+def _refuse_bad_numbers(options: argparse.Namespace) -> None:
+    limits = (
+        ("--cases", options.cases, 1, "at least 1"),
+        ("--first-case", options.first_case, 0, "at least 0"),
+        ("--threads", options.threads, 1, "at least 1"),
+    )
+    for name, value, least, expected in limits:
+        if value is not None and value < least:
+            raise StudyError(f"{name}: {value} given, expected {expected}")
+    if options.first_case + options.cases > 2**32:
+        raise StudyError(f"--cases: {options.cases} from case {options.first_case} on, expected cases below 2**32")
+    if not 0.0 < options.sample < 1e9:
+        raise StudyError(f"--sample: {options.sample:g} given, expected seconds above 0")
+
+
+def _configurations(mission: Mission, options: argparse.Namespace) -> list[Configuration]:
+    """Every estimator with every use of the gyro at every point of the sweeps."""
+    axes = []
+    for sweep in options.sweep:
+        key, _, values = sweep.partition("=")
+        points = [value.strip() for value in values.split(",") if value.strip()]
+        if not points:
+            raise StudyError(f"--sweep {sweep}: expected KEY=V1,V2,...")
+        axes.append([f"{key.strip()}={value}" for value in points])
+    estimators = options.estimators or [mission.values.graph.estimator]
+    return [
+        Configuration(estimator, gyro == "on", point)
+        for point in itertools.product(*axes)
+        for estimator in dict.fromkeys(estimators)
+        for gyro in dict.fromkeys(options.gyro)
+    ]
+
+
+def _default_folder(mission: str) -> Path:
+    home = Path(os.environ.get("SUNPOINT_HOME", "."))
+    return home / "studies" / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
+
+
+def _progress_bar(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TextColumn("cases"),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        console=console,
+        disable=not console.is_terminal,
+    )
+
+
+_COLUMNS = (
+    ("heading_error_mean_deg", "heading\nmean\n[deg]", "{:.2f}"),
+    ("heading_error_p95_deg", "heading\n95 %\n[deg]", "{:.2f}"),
+    ("power_positive_fraction", "power\npositive\n[%]", "{:.1%}"),
+    ("converging_mean_s", "con-\nverging\nmean [s]", "{:.1f}"),
+    ("converging_max_s", "con-\nverging\nmax [s]", "{:.1f}"),
+    ("rate_50min_deg_s", "rate\n50 min\n[deg/s]", "{:.3f}"),
+    ("rate_knowledge_50min_deg_s", "rate error\n50 min\n[deg/s]", "{:.3f}"),
+)
+
+
+def print_study(study: Study, result: dict, console: Console) -> None:
+    """The table of a study and where its files are."""
+    table = Table(box=box.SIMPLE_HEAD)
+    swept = any(row["overrides"] for row in result["configurations"])
+    for name in ("estimator", "gyro", *(["swept"] if swept else [])):
+        table.add_column(name, vertical="bottom")
+    for _, title, _ in _COLUMNS:
+        table.add_column(title, justify="right", vertical="bottom")
+    for row in result["configurations"]:
+        named = [row["estimator"], row["gyro"], *([" ".join(row["overrides"])] if swept else [])]
+        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+        table.add_row(*named, *figures)
+    console.print(table)
+    if study.flown:
+        console.print(
+            f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
+            f"{result['cpu_s']:.1f} s CPU: {result['cpu_ns_per_case_step']:.0f} ns a case and step"
+        )
+    else:
+        console.print("this study was complete; nothing was flown")
+    console.print(f"study: {study.folder}", soft_wrap=True)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
