@@ -9,7 +9,7 @@ from matplotlib import image
 from synthetic_study import case_table, percentile_table
 
 from css_studies.commands.reproduce import main
-from css_studies.monte_carlo.study import Configuration, Study
+from css_studies.monte_carlo import Configuration, Study
 from css_studies.reproduce.okeefe import paper
 from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED
 from css_studies.reproduce.okeefe.flights import column, curve, merit

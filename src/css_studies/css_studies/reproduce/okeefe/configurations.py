@@ -4,7 +4,7 @@
 from typing import NamedTuple
 
 from css_studies.figure_style import BLUE, GREEN, ORANGE, PURPLE, VERMILION
-from css_studies.monte_carlo.study import Configuration
+from css_studies.monte_carlo import Configuration
 
 MISSION = "okeefe_2013"
 

@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from css_studies.monte_carlo.study import Configuration
+from css_studies.monte_carlo import Configuration
 
 _MINUTE = 60.0
 

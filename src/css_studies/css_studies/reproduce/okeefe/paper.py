@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 
 from css_common.mission import Mission, load_mission
-from css_studies.monte_carlo.study import Configuration, Study, run_study
+from css_studies.monte_carlo import Configuration, Study, run_study
 from css_studies.reproduce.okeefe import calibration_page
 from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION
 from css_studies.reproduce.okeefe.flight_figures import Variant

@@ -3,7 +3,7 @@
 
 from typing import NamedTuple
 
-from css_studies.monte_carlo.study import Configuration
+from css_studies.monte_carlo import Configuration
 from css_studies.reproduce.okeefe.configurations import AS_PRINTED, SWEPT
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_studies.figure_style import legend, new_figure, save, style
-from css_studies.monte_carlo.study import Configuration
+from css_studies.monte_carlo import Configuration
 from css_studies.reproduce.okeefe.configurations import Entry
 from css_studies.reproduce.okeefe.flights import Merit
 from css_studies.reproduce.okeefe.side_studies import Sweep, changed
