@@ -48,6 +48,17 @@ def mission_of(arguments: argparse.Namespace) -> Mission:
     return load_mission(arguments.mission, overrides)
 
 
+def whole_number(text: str) -> int:
+    """A count from the command line, at least 1."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = 0
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} given, expected a whole number from 1 on")
+    return value
+
+
 def add_output_options(parser: argparse.ArgumentParser) -> None:
     """Where results go and how they are printed."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="recording folder (default: bags/MISSION_CASE_TIME)")

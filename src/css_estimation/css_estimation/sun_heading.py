@@ -6,7 +6,8 @@ A Sun estimator is a module with a `PARAMETERS` table, `parameters(values)`, `in
     step(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted) -> (state, SunHeading)
 
 with `dt` [s] since the last step, `voltages` (N,) [-], `gyro_b` [rad/s], `gyro_valid` a bool and
-`eclipse_predicted` one of the `PREDICTION_*` constants. Node, replay and Monte Carlo need nothing else of it.
+`eclipse_predicted` one of the `PREDICTION_*` constants. Node, replay and Monte Carlo need nothing else of it. What
+`parameters` returns is a NamedTuple that the module itself defines: by its type the Monte Carlo finds the module.
 """
 
 from typing import NamedTuple

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from css_common.kernel import kernel
+from css_common.kernel import kernel, outer_kernel
 from css_estimation.cell_layout import CellLayout, brightest, sees
 from css_estimation.lit_cells import Gate, lit_cells
 
@@ -35,7 +35,7 @@ def _sphere() -> np.ndarray:
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=1)
 
 
-@kernel
+@outer_kernel
 def _masks(layout: CellLayout, gate: Gate, sphere, masks_out) -> None:
     voltages = np.zeros(layout.cells.shape[0])
     for k in range(sphere.shape[0]):

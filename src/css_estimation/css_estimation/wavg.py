@@ -8,6 +8,8 @@ Modes: 0 no Sun, 1 average of several cells, 2 a single cell (the error can reac
 brightest cell below an absolute gate.
 """
 
+from typing import NamedTuple
+
 from css_common.kernel import kernel
 from css_common.schema import Table, Values
 from css_common.vectors import Vec3, norm, scale
@@ -28,12 +30,18 @@ MODE_BELOW_GATE = 3
 _NO_DIRECTION = 1e-6
 
 
-def parameters(values: Values) -> SnapshotParameters:
+class WavgParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    snapshot: SnapshotParameters
+
+
+def parameters(values: Values) -> WavgParameters:
     """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
-    return snapshot.parameters(values)
+    return WavgParameters(snapshot.parameters(values))
 
 
-def initial_state(p: SnapshotParameters) -> TrackingState:
+def initial_state(p: WavgParameters) -> TrackingState:
     """No estimate yet."""
     return sun_tracking.initial_state()
 
@@ -67,7 +75,7 @@ def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tupl
 
 @kernel
 def step(
-    p: SnapshotParameters,
+    p: WavgParameters,
     state: TrackingState,
     dt: float,
     voltages,
@@ -77,6 +85,6 @@ def step(
 ) -> tuple[TrackingState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun_heading`."""
     top = brightest(voltages)
-    sun_b, lit_mask, mode = weighted_average(p.layout, p.gate, voltages, top)
+    sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
     seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)
-    return finish_snapshot(p, state, dt, voltages, top, gyro_b, gyro_valid, eclipse_predicted, seen)
+    return finish_snapshot(p.snapshot, state, dt, voltages, top, gyro_b, gyro_valid, eclipse_predicted, seen)

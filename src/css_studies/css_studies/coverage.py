@@ -96,7 +96,7 @@ def layout_of(cell_values: Values, average_values: Values) -> Layout:
         levels=0.0,
     )
     cells = nominal_cells(cell_values.cells.normals, cell_sides(cell_values))
-    average = wavg.parameters(average_values)
+    average = wavg.parameters(average_values).snapshot
     return Layout(chain, cells, average.layout, average.gate)
 
 

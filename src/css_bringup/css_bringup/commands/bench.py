@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Measures the speed of the flight software on this machine.
+"""Measures the speed of the software on this machine.
 
 graph: the mission's graph in lockstep, composed in one process and as one process per node, recorded and not.
 Figures are the real-time factor (simulated over wall time) and processor time a control cycle.
+
+monte-carlo: processor time of a step of a case, here and in Basilisk, which is installed below .cache/ once. About two
+minutes on two processors.
 """
 
 import argparse
@@ -13,11 +16,14 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from rich.markup import escape
 from rich.table import Table
 
+from css_bringup import monte_carlo_bench
 from css_bringup.flight import FlightResult
 from css_bringup.flying import fly
-from css_bringup.options import FAILED, console, errors, guarded
+from css_bringup.json_process import MeasurementError
+from css_bringup.options import FAILED, console, errors, guarded, whole_number
 from css_bringup.report import print_json
 from css_common.mission import Mission, load_mission
 
@@ -33,27 +39,44 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("subject", choices=("graph",), help="what to measure")
-    parser.add_argument("--mission", default="okeefe_2013", help="mission to fly (default: %(default)s)")
-    parser.add_argument("--duration", type=float, default=300.0, help="simulated time of one flight [s] (default: 300)")
-    parser.add_argument("--repeats", type=int, default=3, help="flights of each kind; medians are printed (default: 3)")
-    parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
+    subjects = parser.add_subparsers(dest="subject", required=True, metavar="{graph,monte-carlo}")
+    graph = subjects.add_parser("graph", help="the graph of nodes in lockstep")
+    graph.add_argument("--mission", default="okeefe_2013", help="mission to fly (default: %(default)s)")
+    graph.add_argument("--duration", type=float, default=300.0, help="simulated time of one flight [s] (default: 300)")
+    graph.add_argument(
+        "--repeats", type=whole_number, default=3, help="flights of each kind; medians are printed (default: 3)"
+    )
+    graph.set_defaults(run=_bench_graph)
+    monte_carlo = subjects.add_parser("monte-carlo", help="the Monte Carlo beside Basilisk")
+    monte_carlo_bench.add_options(monte_carlo)
+    monte_carlo.set_defaults(run=_bench_monte_carlo)
+    for subject in (graph, monte_carlo):
+        subject.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser
 
 
 def main(args: list[str] | None = None) -> int:
     """Entry point."""
     arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    return guarded(lambda: arguments.run(arguments))
 
 
-def _run(arguments: argparse.Namespace) -> int:
+def _bench_monte_carlo(arguments: argparse.Namespace) -> int:
+    try:
+        monte_carlo_bench.run(arguments)
+    except MeasurementError as error:
+        errors.print(f"[red]error:[/red] {escape(str(error))}", soft_wrap=True)
+        return FAILED
+    return 0
+
+
+def _bench_graph(arguments: argparse.Namespace) -> int:
     # field checks of messages are for tests: they cost a fifth of the loop
     os.environ.pop("ROS_PYTHON_CHECK_FIELDS", None)
     mission = load_mission(arguments.mission, [f"mission.duration={arguments.duration}"])
     measured: dict[str, list[FlightResult]] = {name: [] for name in _CONFIGURATIONS}
     # kinds interleaved, so that a slow minute of the machine falls on all of them
-    for _ in range(max(1, arguments.repeats)):
+    for _ in range(arguments.repeats):
         for name, (processes, recorded) in _CONFIGURATIONS.items():
             result = _fly_once(mission, processes=processes, recorded=recorded)
             if result.failure or result.interrupted:
