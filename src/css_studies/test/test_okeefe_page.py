@@ -12,7 +12,8 @@ from css_studies.commands.reproduce import main
 from css_studies.monte_carlo import Configuration, Study
 from css_studies.reproduce.okeefe import paper
 from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED
-from css_studies.reproduce.okeefe.flights import column, curve, merit
+from css_studies.reproduce.okeefe.flight_figures import Variant
+from css_studies.reproduce.okeefe.flights import column, curve, merit, rate_error_before
 from css_studies.reproduce.okeefe.numbers import flight_rows
 
 ENGINE_QUANTITIES = {"heading error at the end", "rate at 50 min", "rate error at 50 min", "longest converging"}
@@ -24,7 +25,6 @@ GOOD = {
     "converging_later_s": [0.0, 60.0, 0.0],
     "acquired_s": [60.0, 120.0, 180.0],
     "rate_50min_deg_s": [0.01, 0.02, 0.0],
-    "rate_knowledge_50min_deg_s": [0.001, 0.002, 0.003],
 }
 
 
@@ -33,11 +33,18 @@ def without_display(monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
 
 
+def rows_of(values, is_printed):
+    """Rows of one configuration by quantity."""
+    tables = case_table([A], 3, {A: values}), percentile_table([A], np.arange(0.0, 3600.0, 10.0))
+    entry = AS_PRINTED[0]._replace(configuration=A)
+    return {row.quantity: row for row in flight_rows(Variant("improved", is_printed, [entry], *tables))}
+
+
 def test_figures_of_merit_of_one_configuration_among_several():
     m = merit(case_table([A, B], 3, {A: GOOD}), A)
     assert m.cases == 3 and m.converged_percent == 100.0
     assert m.heading_error_late_deg == pytest.approx(5.0)
-    assert m.rate_50min_deg_s == pytest.approx(0.01) and m.rate_knowledge_50min_deg_s == pytest.approx(0.002)
+    assert m.rate_50min_deg_s == pytest.approx(0.01)
     assert (m.converging_mean_min, m.converging_max_min) == (pytest.approx(1.0), pytest.approx(1.5))
     assert (m.converging_first_max_min, m.converging_later_max_min) == (pytest.approx(1.0), pytest.approx(1.0))
     assert m.acquired_mean_min == pytest.approx(2.0)
@@ -48,10 +55,11 @@ def test_a_case_that_never_converges_is_no_good_maximum():
     m = merit(case_table([A], 3, {A: never}), A)
     assert m.converging_max_min is None and m.converging_mean_min == pytest.approx(0.75)
     assert m.converged_percent == pytest.approx(200.0 / 3.0) and m.acquired_mean_min == pytest.approx(1.5)
-    rows = {row.quantity: row for row in flight_rows("", {"average, gyro": m})}
+    rows = rows_of(never, True)
     assert not rows["average, gyro: longest converging"].ok and not rows["average, gyro: cases converged"].ok
-    nothing = {name: [None] * 3 for name in GOOD}
-    assert merit(case_table([A], 3, {A: nothing}), A)[1:] == (None, *[m for m in merit(case_table([A], 3, {A: nothing}), A)[2:]])
+    nothing = merit(case_table([A], 3, {A: {name: [None] * 3 for name in GOOD}}), A)
+    assert nothing.heading_error_late_deg is None and nothing.acquired_p95_min is None
+    assert nothing.converged_percent == 0.0
 
 
 def test_overrides_tell_configurations_apart():
@@ -62,11 +70,17 @@ def test_overrides_tell_configurations_apart():
     np.testing.assert_allclose((line.time_s, line.mean, line.p95), (time_s, time_s + 2.0, 2.0 * time_s + 4.0))
 
 
+def test_where_no_rate_is_measured_the_last_minute_before_counts():
+    time_s = np.arange(0.0, 3600.0, 10.0)
+    dark = percentile_table([A], time_s, lambda c, q, t: np.where((t > 2000.0) & (t < 3300.0), np.nan, t))
+    assert rate_error_before(dark, A, 3000.0) == (pytest.approx(1975.0), 2000.0)
+    light = percentile_table([A], time_s, lambda c, q, t: t)
+    assert rate_error_before(light, A, 3000.0) == (pytest.approx(2975.0), 3000.0)
+    assert rate_error_before(percentile_table([A], time_s, lambda c, q, t: t * np.nan), A, 3000.0) is None
+
+
 def test_the_improved_must_beat_what_is_printed():
-    m = merit(case_table([A], 3, {A: GOOD}), A)
-    printed, improved = (
-        {row.quantity: row for row in flight_rows(variant, {"average, gyro": m})} for variant in ("", "improved")
-    )
+    printed, improved = rows_of(GOOD, True), rows_of(GOOD, False)
     quantity = "average, gyro: heading error at the end"
     assert printed[quantity].ok and str(printed[quantity].must) == "4 to 7"
     # 5.00 is what an average has, but it is not better than 4.99
@@ -111,7 +125,9 @@ def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
 
 def test_a_quick_look_leaves_side_studies_out(tmp_path, monkeypatch):
     flown = []
-    monkeypatch.setattr(paper, "run_study", lambda m, c, n, f, **k: flown.append((f.name, n, len(c))) or made_up(m, c, n, f))
+    monkeypatch.setattr(
+        paper, "run_study", lambda m, c, n, f, **k: flown.append((f.name, n, len(c))) or made_up(m, c, n, f)
+    )
     assert main(["okeefe", "--quick", "--out", str(tmp_path)]) == 0
     assert flown == [("flights_40", 40, len(AS_PRINTED) + len(IMPROVED))]
     assert not (tmp_path / "calibration.html").exists()
@@ -122,8 +138,8 @@ def test_a_quick_look_leaves_side_studies_out(tmp_path, monkeypatch):
     [
         (["okeffe"], "did you mean okeefe"),
         (["../okeefe"], "unknown"),
-        (["okeefe", "--cases", "0"], "at least 1"),
-        (["okeefe", "--cases", "-3"], "at least 1"),
+        (["okeefe", "--cases", "0"], "expected 1 to"),
+        (["okeefe", "--cases", "-3"], "expected 1 to"),
         (["okeefe", "--out", "/proc/nowhere"], "/proc/nowhere"),
     ],
 )

@@ -4,6 +4,7 @@
 import argparse
 import json
 import os
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,12 +15,15 @@ from rich.table import Table
 from rich.text import Text
 
 from css_common.mission_file import MissionError
+from css_studies.monte_carlo import StudyError
+from css_studies.monte_carlo.progress import progress_bar
+from css_studies.monte_carlo.study import Progress
 from css_studies.reproduce.papers import Paper, ReproductionError, Request, find_paper, paper_names
 from css_studies.reproduce.rows import Row, number, printed, row_object
 
-USAGE = 2
+USAGE, INTERRUPTED = 2, 130
 CASES, QUICK_CASES = 1000, 40
-_EPILOG = "Exit code: 0 done, also when numbers miss; 2 an argument is wrong, or the folder cannot be written."
+_EPILOG = "Exit code: 0 done, also when numbers miss, 2 an argument or the folder is wrong, 130 interrupted."
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -37,28 +41,38 @@ def _parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     options = _parser().parse_args(arguments)
-    console = Console(highlight=False)
+    # a killed terminal or `kill` end it as Ctrl-C does: finished flights stay
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
-        paper = find_paper(options.paper)
-        request = _request(options, paper)
-        rows = paper.reproduce(request)
-    except (ReproductionError, MissionError, OSError) as error:
+        return _run(options)
+    except (ReproductionError, MissionError, StudyError, OSError) as error:
         print(f"reproduce: {error}", file=sys.stderr)
         return USAGE
+    except KeyboardInterrupt:
+        print("reproduce: interrupted; the same command goes on from here", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _run(options: argparse.Namespace) -> int:
+    paper = find_paper(options.paper)
+    cases = (QUICK_CASES if options.quick else CASES) if options.cases is None else options.cases
+    if not 1 <= cases <= 2**32:
+        raise ReproductionError(f"--cases: {cases} given, expected 1 to {2**32}")
+    folder = options.out or Path(os.environ.get("SUNPOINT_HOME", "."), "reports", paper.name)
+    folder.mkdir(parents=True, exist_ok=True)
+    with progress_bar(Console(stderr=True)) as bar:
+
+        def progress(name: str) -> Progress:
+            task = bar.add_task(name, total=None)
+            return lambda done, total: bar.update(task, completed=done, total=total)
+
+        rows = paper.reproduce(Request(folder, cases, options.quick, progress))
+    console = Console(highlight=False)
     _print_table(paper, rows, console)
-    console.print(f"page: {request.folder / 'index.html'}", soft_wrap=True)
+    console.print(f"page: {folder / 'index.html'}", soft_wrap=True)
     if options.json:
         print(json.dumps({"paper": paper.name, "rows": [row_object(row) for row in rows]}, allow_nan=False))
     return 0
-
-
-def _request(options: argparse.Namespace, paper: Paper) -> Request:
-    cases = (QUICK_CASES if options.quick else CASES) if options.cases is None else options.cases
-    if cases < 1:
-        raise ReproductionError(f"--cases: {cases} given, expected at least 1")
-    folder = options.out or Path(os.environ.get("SUNPOINT_HOME", "."), "reports", paper.name)
-    folder.mkdir(parents=True, exist_ok=True)
-    return Request(folder, cases, options.quick)
 
 
 def _print_table(paper: Paper, rows: Sequence[Row], console: Console) -> None:

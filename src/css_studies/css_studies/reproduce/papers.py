@@ -13,10 +13,11 @@ import pkgutil
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from css_common.schema import unknown_name
 from css_studies import reproduce
+from css_studies.monte_carlo.study import Progress
 from css_studies.reproduce.rows import Row
 
 
@@ -30,7 +31,7 @@ class Request(NamedTuple):
     folder: Path  # exists; figures, pages and studies go here
     cases: int  # of each configuration that flies
     quick: bool  # a first look: side studies are left out
-    progress: Any = None  # shows how far a study is; None: nothing is shown
+    progress: Callable[[str], Progress] | None = None  # what to tell how far the study of a name is
 
 
 class Paper(NamedTuple):

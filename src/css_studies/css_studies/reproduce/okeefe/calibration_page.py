@@ -7,9 +7,9 @@ import pyarrow as pa
 
 from css_studies.reproduce.okeefe.configurations import SWEPT
 from css_studies.reproduce.okeefe.flights import merit
-from css_studies.reproduce.okeefe.side_studies import SWEEPS, Sweep, changed, sweep_configurations
 from css_studies.reproduce.okeefe.sweep_figures import write_sweep
-from css_studies.reproduce.page import Page, Picture, Section, Table
+from css_studies.reproduce.okeefe.sweeps import SWEEPS, Sweep, changed, sweep_configurations
+from css_studies.reproduce.page import Block, Page, Picture, Section, Table
 from css_studies.reproduce.rows import number
 
 NAME = "calibration"
@@ -27,7 +27,7 @@ def calibration_page(cases: pa.Table, cases_each: int, folder: Path) -> Page:
     sections = []
     for sweep in SWEEPS:
         file = write_sweep(sweep, SWEPT, merits, folder / f"{NAME}_{sweep.name}.png")
-        blocks = [sweep.explanation, Picture(file.name, sweep.title), _table(sweep, merits)]
+        blocks: list[Block] = [sweep.explanation, Picture(file.name, sweep.title), _table(sweep, merits)]
         sections.append(Section(sweep.title, blocks))
     lead = (
         f"What O'Keefe & Schaub 2013 left to future research, for each estimator with gyro and without: {cases_each} "

@@ -17,12 +17,13 @@ class Entry(NamedTuple):
     configuration: Configuration
 
 
-_AVERAGE, _FILTER = "average", "filter"
+AVERAGE, FILTER = "average", "filter"
+"""The two methods of the paper, in labels."""
 _KINDS = (
-    (_AVERAGE, True, ORANGE),
-    (_AVERAGE, False, VERMILION),
-    (_FILTER, True, BLUE),
-    (_FILTER, False, GREEN),
+    (AVERAGE, True, ORANGE),
+    (AVERAGE, False, VERMILION),
+    (FILTER, True, BLUE),
+    (FILTER, False, GREEN),
 )
 
 
@@ -31,25 +32,31 @@ def _label(name: str, gyro: bool) -> str:
 
 
 AS_PRINTED = tuple(
-    Entry(_label(kind, gyro), colour, Configuration({_AVERAGE: "wavg", _FILTER: "ekf"}[kind], gyro))
+    Entry(_label(kind, gyro), colour, Configuration({AVERAGE: "wavg", FILTER: "ekf"}[kind], gyro))
     for kind, gyro, colour in _KINDS
 )
 """Weighted average and extended Kalman filter with the paper's gains and deadband."""
 
-_CONTROL = ("mrp_control.deadband_behaviour=damp",)
+_CONTROL = (
+    "mrp_control.deadband_behaviour=damp",
+    "mrp_control.deadband_deg=4",
+    "mrp_control.gains.k=0.3",
+    "mrp_control.gains.p=1.5",
+)
 
 IMPROVED = tuple(
-    Entry(_label(kind, gyro), colour, Configuration({_AVERAGE: "wls", _FILTER: "ekf"}[kind], gyro, _CONTROL))
+    Entry(_label(kind, gyro), colour, Configuration({AVERAGE: "wls", FILTER: "ekf"}[kind], gyro, _CONTROL))
     for kind, gyro, colour in _KINDS
 )
-"""What flies in their places when it shall be better: weighted least squares for the average."""
+"""What flies in their places to be better: least squares for the average, and for both a stiffer control, which
+damps rates on the Sun too. Of the gains and deadbands that were tried, these were good for all four."""
 
 SWEPT = tuple(
     Entry(_label(name, gyro), colour, Configuration(estimator, gyro))
     for estimator, name, colour in (
-        ("wavg", _AVERAGE, ORANGE),
+        ("wavg", AVERAGE, ORANGE),
         ("wls", "least squares", PURPLE),
-        ("ekf", _FILTER, BLUE),
+        ("ekf", FILTER, BLUE),
     )
     for gyro in (True, False)
 )

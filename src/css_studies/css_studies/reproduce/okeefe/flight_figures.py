@@ -31,6 +31,7 @@ class Variant(NamedTuple):
     """One set of four configurations and its flights."""
 
     name: str
+    is_printed: bool  # as the paper has it
     entries: Sequence[Entry]
     cases: pa.Table
     percentiles: pa.Table

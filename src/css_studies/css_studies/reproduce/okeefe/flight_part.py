@@ -5,12 +5,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 
 from css_common.mission import Mission
 from css_environment.mission_environment import MissionEnvironment
 from css_studies.flight_log import SUNLIT_FRACTION
-from css_studies.reproduce.okeefe.configurations import AS_PRINTED
 from css_studies.reproduce.okeefe.flight_figures import (
     HEADING_ERROR,
     POINTING_ERROR,
@@ -24,14 +22,11 @@ from css_studies.reproduce.okeefe.flight_figures import (
 from css_studies.reproduce.okeefe.flights import Merit, merit
 from css_studies.reproduce.okeefe.numbers import (
     CONVERGING_LIMITS_MIN,
-    HEADING,
     attitude_rows,
     flight_rows,
     orbit_rows,
 )
-from css_studies.reproduce.okeefe.side_studies import CONTROLS, changed
 from css_studies.reproduce.page import Part, Picture, Section, Table
-from css_studies.reproduce.rows import number
 
 
 def shadow_of(mission: Mission, step_s: float = 1.0) -> Shadow:
@@ -67,8 +62,8 @@ def flight_part(
     )
     rows = [
         *orbit_rows(mission.values.mission.duration, shadow),
-        *flight_rows("", _merits(printed), notes),
-        *flight_rows(improved.name, _merits(improved)),
+        *flight_rows(printed, notes),
+        *flight_rows(improved),
         *attitude_rows(printed, shadow),
     ]
     return Part([Section("Flights", plots), Section("Converging", [converging_table(variants)])], rows)
@@ -92,28 +87,6 @@ def _minutes(value: float | None) -> str:
 
 def _merits(variant: Variant) -> dict[str, Merit]:
     return {entry.label: merit(variant.cases, entry.configuration) for entry in variant.entries}
-
-
-def control_table(cases: pa.Table) -> Table:
-    """What each change does to the flights as printed; `cases` of a study of `control_configurations`."""
-    heading = ["", "heading error [deg]", "rate at 50 min [deg/s]", "mean converging [min]", "longest converging [min]"]
-    lines = []
-    for entry in AS_PRINTED:
-        for change in CONTROLS:
-            m = merit(cases, changed(entry.configuration, change))
-            values = (m.heading_error_late_deg, m.rate_50min_deg_s, m.converging_mean_min, m.converging_max_min)
-            lines.append([f"{entry.label}: {change.label}", *map(number, values)])
-    return Table(heading, lines)
-
-
-def difference_notes(cases: pa.Table) -> dict[tuple[str, str], str]:
-    """Label and kind of quantity to what the controls say about the difference to the paper."""
-    notes = {}
-    for entry in AS_PRINTED:
-        results = {change.label: merit(cases, changed(entry.configuration, change)) for change in CONTROLS}
-        errors = {label: number(m.heading_error_late_deg) for label, m in results.items()}
-        notes[entry.label, HEADING] = "; ".join(f"{label} {error}" for label, error in errors.items())
-    return notes
 
 
 def settings(mission: Mission, improved: Variant) -> list[str]:

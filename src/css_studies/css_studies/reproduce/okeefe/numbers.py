@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from css_studies.monte_carlo import Configuration
 from css_studies.reproduce.okeefe.cells import OrbitOutputs
 from css_studies.reproduce.okeefe.flight_figures import POINTING_ERROR, Shadow, Variant
-from css_studies.reproduce.okeefe.flights import Merit, curve
+from css_studies.reproduce.okeefe.flights import curve, merit, rate_error_before
 from css_studies.reproduce.rows import Must, Row, number, row
 
 _LATE_S = 300.0  # sunlit time at the end of a flight over which errors are averaged, as in a study's cases
@@ -21,6 +22,7 @@ _LATE_S = 300.0  # sunlit time at the end of a flight over which errors are aver
 # mean norm of the gyro's white noise, 0.01 deg/s on each of three axes
 _NOISE_DEG_S = 0.01 * math.sqrt(8.0 / math.pi)
 _DEADBAND_DEG = 15.0
+_REPORT_TIME_S = 3000.0
 
 HEADING, RATE, KNOWLEDGE, CONVERGING, CONVERGED = "heading", "rate", "knowledge", "converging", "converged"
 """Kinds of quantities of a flight."""
@@ -108,41 +110,60 @@ def albedo_rows(low: Peaks, polar: Peaks) -> list[Row]:
     return [line("45", 25.0, low, Must(20.0, 30.0)), line("90", 50.0, polar, Must(35.0, 60.0))]
 
 
-def flight_rows(
-    variant: str, merits: Mapping[str, Merit], notes: Mapping[tuple[str, str], str] | None = None
-) -> list[Row]:
-    """The flights of one variant.
+def flight_rows(variant: Variant, notes: Mapping[tuple[str, str], str] | None = None) -> list[Row]:
+    """The flights of a variant, which keeps to the paper's bounds as printed, and else must be better than the paper.
 
     Args:
-        variant: empty: as printed, which must keep to the paper's bounds; else it must be better than the paper.
-        merits: label of a configuration to what it achieved.
-        notes: label and kind of quantity to why it differs from the paper.
+        notes: label of a configuration and kind of quantity to why it differs from the paper.
     """
     rows = []
-    for label, merit in merits.items():
-        paper = _PAPER[label]
+    for label, _, configuration in variant.entries:
+        paper, here = _PAPER[label], merit(variant.cases, configuration)
+        error_must = _ERROR_MUST[label.split(",")[0]] if variant.is_printed else Must(None, paper.error_deg)
+        rate_error, rate_note = _rate_error(variant, configuration)
 
         def line(
-            kind: str, what: str, unit: str, printed: float | None, here: float | None, must: Must | None,
-            relation: str = "", label: str = label,
-        ) -> Row:  # fmt: skip
-            note = (notes or {}).get((label, kind), "")
-            return row(f"{label}: {what}", unit, printed, here, must, relation=relation, note=note, variant=variant)
+            kind: str,
+            what: str,
+            unit: str,
+            printed: float | None,
+            value: float | None,
+            must: Must,
+            relation: str = "",
+            note: str = "",
+            label: str = label,
+        ) -> Row:
+            note = "; ".join(filter(None, ((notes or {}).get((label, kind), ""), note)))
+            name = "" if variant.is_printed else variant.name
+            return row(
+                f"{label}: {what}", unit, printed, value, must, relation=relation, note=note, variant=name
+            )  # fmt: skip
 
-        error_must = Must(None, paper.error_deg) if variant else _ERROR_MUST[label.split(",")[0]]
         rows += [
-            line(HEADING, "heading error at the end", "deg", paper.error_deg, merit.heading_error_late_deg,
-                 error_must),
-            line(RATE, "rate at 50 min", "deg/s", paper.rate_deg_s, merit.rate_50min_deg_s,
+            line(HEADING, "heading error at the end", "deg", paper.error_deg, here.heading_error_late_deg, error_must),
+            line(RATE, "rate at 50 min", "deg/s", paper.rate_deg_s, here.rate_50min_deg_s,
                  Must(None, paper.rate_deg_s or _NOISE_DEG_S), "" if paper.rate_deg_s else "noise level"),
-            line(KNOWLEDGE, "rate error at 50 min", "deg/s", paper.knowledge_deg_s,
-                 merit.rate_knowledge_50min_deg_s, Must(None, paper.knowledge_deg_s or _NOISE_DEG_S),
-                 "" if paper.knowledge_deg_s else "noise level"),
-            line(CONVERGING, "longest converging", "min", paper.converging_min, merit.converging_max_min,
+            line(KNOWLEDGE, "rate error at 50 min", "deg/s", paper.knowledge_deg_s, rate_error,
+                 Must(None, paper.knowledge_deg_s or _NOISE_DEG_S), "" if paper.knowledge_deg_s else "noise level",
+                 rate_note),
+            line(CONVERGING, "longest converging", "min", paper.converging_min, here.converging_max_min,
                  Must(None, paper.converging_min), paper.relation),
-            line(CONVERGED, "cases converged", "%", 100.0, merit.converged_percent, Must(100.0)),
+            line(CONVERGED, "cases converged", "%", 100.0, here.converged_percent, Must(100.0)),
         ]  # fmt: skip
     return rows
+
+
+def _rate_error(variant: Variant, configuration: Configuration) -> tuple[float | None, str]:
+    found = rate_error_before(variant.percentiles, configuration, _REPORT_TIME_S)
+    if found is None:
+        return None, ""
+    value, end_s = found
+    if end_s > _REPORT_TIME_S - 60.0:
+        return value, ""
+    return (
+        value,
+        f"at 50 min it is dark here and nothing measures a rate: the last minute before, at {end_s / 60:.1f} min",
+    )
 
 
 def attitude_rows(variant: Variant, shadow: Shadow) -> list[Row]:

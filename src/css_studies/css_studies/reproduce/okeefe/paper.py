@@ -7,10 +7,11 @@ from css_common.mission import Mission, load_mission
 from css_studies.monte_carlo import Configuration, Study, run_study
 from css_studies.reproduce.okeefe import calibration_page
 from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION
+from css_studies.reproduce.okeefe.controls import control_configurations, control_table, difference_notes
 from css_studies.reproduce.okeefe.flight_figures import Variant
-from css_studies.reproduce.okeefe.flight_part import control_table, difference_notes, flight_part, settings
+from css_studies.reproduce.okeefe.flight_part import flight_part, settings
 from css_studies.reproduce.okeefe.sensor_part import sensor_part
-from css_studies.reproduce.okeefe.side_studies import control_configurations, sweep_configurations
+from css_studies.reproduce.okeefe.sweeps import sweep_configurations
 from css_studies.reproduce.page import Link, Listing, Page, Section, Table, write_page
 from css_studies.reproduce.papers import Request
 from css_studies.reproduce.rows import Row, notes_of, table_of
@@ -26,8 +27,8 @@ def reproduce(request: Request) -> list[Row]:
     sensors = sensor_part(mission, request.folder)
     configurations = [entry.configuration for entry in (*AS_PRINTED, *IMPROVED)]
     flown = _fly(mission, configurations, request.cases, "flights", request)
-    printed = Variant("as the paper", AS_PRINTED, flown.cases, flown.percentiles)
-    improved = Variant("improved", IMPROVED, flown.cases, flown.percentiles)
+    printed = Variant("as the paper", True, AS_PRINTED, flown.cases, flown.percentiles)
+    improved = Variant("improved", False, IMPROVED, flown.cases, flown.percentiles)
     beside = max(1, request.cases // _SIDE_SHARE)
     notes = {}
     more = []
@@ -58,4 +59,5 @@ def reproduce(request: Request) -> list[Row]:
 def _fly(mission: Mission, configurations: Sequence[Configuration], cases: int, name: str, request: Request) -> Study:
     # the number of cases is part of the name, so that a quick look leaves a long study alone
     folder = request.folder / "studies" / f"{name}_{cases}"
-    return run_study(mission, configurations, cases, folder, progress=request.progress)
+    progress = None if request.progress is None else request.progress(name)
+    return run_study(mission, configurations, cases, folder, progress=progress)

@@ -11,7 +11,7 @@ from css_studies.figure_style import legend, new_figure, save, style
 from css_studies.monte_carlo import Configuration
 from css_studies.reproduce.okeefe.configurations import Entry
 from css_studies.reproduce.okeefe.flights import Merit
-from css_studies.reproduce.okeefe.side_studies import Sweep, changed
+from css_studies.reproduce.okeefe.sweeps import Sweep, changed
 
 
 class _Panel(NamedTuple):

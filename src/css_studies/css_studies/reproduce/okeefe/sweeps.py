@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Flights beside those of the paper: what its results hang on, and what it left as future work."""
+"""Flights with something changed: the sweeps of what O'Keefe & Schaub 2013 left as future work."""
 
 from typing import NamedTuple
 
 from css_studies.monte_carlo import Configuration
-from css_studies.reproduce.okeefe.configurations import AS_PRINTED, SWEPT
+from css_studies.reproduce.okeefe.configurations import SWEPT
 
 
 class Change(NamedTuple):
@@ -15,16 +15,6 @@ class Change(NamedTuple):
 
 
 UNCHANGED = Change("as flown", ())
-
-CONTROLS = (
-    UNCHANGED,
-    Change("no albedo", ("css_array.albedo.enabled=false",)),
-    Change("ideal cosine, no warp", ("css_array.warp=false",)),
-    Change("no albedo, ideal cosine", ("css_array.albedo.enabled=false", "css_array.warp=false")),
-    Change("every lit cell believed", ("{estimator}.gate=0",)),
-    Change("rates damped in the deadband", ("mrp_control.deadband_behaviour=damp",)),
-)
-"""Changes to the flights as printed, one at a time."""
 
 
 class Sweep(NamedTuple):
@@ -90,11 +80,6 @@ def changed(configuration: Configuration, change: Change) -> Configuration:
     """A configuration with a change."""
     overrides = tuple(text.format(estimator=configuration.estimator) for text in change.overrides)
     return configuration._replace(overrides=configuration.overrides + overrides)
-
-
-def control_configurations() -> list[Configuration]:
-    """What flies for the controls."""
-    return [changed(entry.configuration, change) for change in CONTROLS for entry in AS_PRINTED]
 
 
 def sweep_configurations() -> list[Configuration]:
