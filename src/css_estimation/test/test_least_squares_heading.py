@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from ideal_cells import AZIMUTH, POLAR, WEIGHT, direction, ideal_outputs, percent_of_sphere
 from scipy import stats
 
-from css_common.kernel import kernel
+from css_common.kernel import outer_kernel
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
@@ -43,7 +43,7 @@ def degrees(a, b):
     return math.degrees(angle_between(tuple(map(float, a)), tuple(map(float, b))))
 
 
-@kernel
+@outer_kernel
 def map_of_sphere(p, polar, azimuth, warp, scale, error, squared, mode, trace):
     """Error [rad], squared chord [-], mode and trace of the covariance for each Sun direction."""
     voltages = np.zeros(p.snapshot.layout.cells.size)

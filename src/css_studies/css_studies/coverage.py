@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.component import Component
-from css_common.kernel import kernel
+from css_common.kernel import outer_kernel
 from css_common.mission import Mission, Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values
@@ -118,7 +118,7 @@ def map_cells(layout: Layout, grid: Grid, warp: bool = False) -> CellMap:
     return result
 
 
-@kernel
+@outer_kernel
 def _map(layout: Layout, faults, key: RandomKey, grid: Grid, seen_by_out, error_out) -> None:
     count = layout.cells.shape[0]
     albedo = np.zeros(count)
