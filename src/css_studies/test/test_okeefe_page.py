@@ -8,13 +8,15 @@ import pytest
 from matplotlib import image
 from synthetic_study import case_table, percentile_table
 
+from css_common.mission import load_mission
 from css_studies.commands.reproduce import main
-from css_studies.monte_carlo import Configuration, Study
+from css_studies.monte_carlo import Configuration, Study, read_study
 from css_studies.reproduce.okeefe import paper
-from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED
+from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION
 from css_studies.reproduce.okeefe.flight_figures import Variant
 from css_studies.reproduce.okeefe.flights import column, curve, merit, rate_error_before
 from css_studies.reproduce.okeefe.numbers import flight_rows
+from css_studies.reproduce.page import Part
 
 ENGINE_QUANTITIES = {"heading error at the end", "rate at 50 min", "rate error at 50 min", "longest converging"}
 A, B = Configuration("wavg", True), Configuration("wavg", True, ("css_array.scale=0.8", "wavg.gate=0"))
@@ -128,9 +130,36 @@ def test_a_quick_look_leaves_side_studies_out(tmp_path, monkeypatch):
     monkeypatch.setattr(
         paper, "run_study", lambda m, c, n, f, **k: flown.append((f.name, n, len(c))) or made_up(m, c, n, f)
     )
+    monkeypatch.setattr(paper, "sensor_part", lambda mission, folder: Part([], []))
     assert main(["okeefe", "--quick", "--out", str(tmp_path)]) == 0
     assert flown == [("flights_40", 40, len(AS_PRINTED) + len(IMPROVED))]
     assert not (tmp_path / "calibration.html").exists()
+
+
+def test_a_few_real_flights(tmp_path, monkeypatch, capsys):
+    short = load_mission(MISSION, ["mission.duration=240"])
+    monkeypatch.setattr(paper, "load_mission", lambda name: short)
+    monkeypatch.setattr(paper, "sensor_part", lambda mission, folder: Part([], []))
+    assert main(["okeefe", "--quick", "--cases", "3", "--out", str(tmp_path), "--json"]) == 0
+    rows = {row["quantity"]: row for row in json.loads(capsys.readouterr().out.splitlines()[-1])["rows"]}
+    flown = read_study(tmp_path / "studies" / "flights_3")
+    for entry, variant in ((AS_PRINTED[2], ""), (IMPROVED[0], ", improved")):
+        late = column(flown.cases, entry.configuration, "heading_error_late_deg")
+        assert rows[f"{entry.label}: heading error at the end{variant}"]["here"] == pytest.approx(late.mean())
+        # with a gyro every one of them is on the Sun within the four minutes
+        assert rows[f"{entry.label}: cases converged{variant}"]["ok"] and late.mean() < 5.0
+    # nothing to fly a second time
+    assert main(["okeefe", "--quick", "--cases", "3", "--out", str(tmp_path)]) == 0
+
+
+def test_a_folder_with_another_study_is_refused(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(paper, "sensor_part", lambda mission, folder: Part([], []))
+    (tmp_path / "studies" / "flights_2").mkdir(parents=True)
+    (tmp_path / "studies" / "flights_2" / "notes.txt").write_text("mine", encoding="utf-8")
+    assert main(["okeefe", "--cases", "2", "--out", str(tmp_path)]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "flights_2" in err
+    assert not (tmp_path / "index.html").exists()
 
 
 @pytest.mark.parametrize(

@@ -44,12 +44,18 @@ _CONTROL = (
     "mrp_control.gains.p=1.5",
 )
 
+
+def _improved(estimator: str, gyro: bool) -> Configuration:
+    forget = () if gyro else (f"{estimator}.rate.without_information=zero",)
+    return Configuration(estimator, gyro, (*_CONTROL, *forget))
+
+
 IMPROVED = tuple(
-    Entry(_label(kind, gyro), colour, Configuration({AVERAGE: "wls", FILTER: "ekf"}[kind], gyro, _CONTROL))
+    Entry(_label(kind, gyro), colour, _improved({AVERAGE: "wls", FILTER: "ekf"}[kind], gyro))
     for kind, gyro, colour in _KINDS
 )
-"""What flies in their places to be better: least squares for the average, and for both a stiffer control, which
-damps rates on the Sun too. Of the gains and deadbands that were tried, these were good for all four."""
+"""What flies in their places to be better: least squares for the average, and for both a stiffer control, which damps
+rates on the Sun too and, without gyro, does not hold in the dark the rate that the fading light gave."""
 
 SWEPT = tuple(
     Entry(_label(name, gyro), colour, Configuration(estimator, gyro))

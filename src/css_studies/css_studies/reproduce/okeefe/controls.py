@@ -18,7 +18,8 @@ _IDEAL = Change("ideal cosine, no warp", ("css_array.warp=false",))
 _IDEAL_NO_ALBEDO = Change("no albedo, ideal cosine", (*_NO_ALBEDO.overrides, *_IDEAL.overrides))
 _EVERY_CELL = Change("every lit cell believed", ("{estimator}.gate=0",))
 _DAMPED = Change("rates damped in the deadband", ("mrp_control.deadband_behaviour=damp",))
-_CHANGES = (UNCHANGED, _NO_ALBEDO, _IDEAL, _IDEAL_NO_ALBEDO, _EVERY_CELL, _DAMPED)
+_BOUNDED = Change("rates from Sun vectors bounded to 5 deg/s", ("{estimator}.rate.limit_deg_s=5",))
+_CHANGES = (UNCHANGED, _NO_ALBEDO, _IDEAL, _IDEAL_NO_ALBEDO, _EVERY_CELL, _DAMPED, _BOUNDED)
 
 
 class _Column(NamedTuple):
@@ -53,6 +54,7 @@ def control_table(cases: pa.Table) -> Table:
 def difference_notes(cases: pa.Table) -> dict[tuple[str, str], str]:
     """Label and kind of quantity to what the controls say about the difference to the paper."""
     notes = {}
+    entries = {entry.label: entry.configuration for entry in AS_PRINTED}
     for label, results in _results(cases).items():
         error = {change: number(m.heading_error_late_deg) for change, m in results.items()}
         longest = {change: number(m.converging_max_min) for change, m in results.items()}
@@ -70,7 +72,12 @@ def difference_notes(cases: pa.Table) -> dict[tuple[str, str], str]:
                 f"which cells are believed decides, of which the paper says little: if it is every lit one "
                 f"{error[_EVERY_CELL]}; {parts}"
             )
-        notes[label, CONVERGING] = f"if every lit cell is believed {longest[_EVERY_CELL]}"
+        if not entries[label].gyro:
+            notes[label, CONVERGING] = (
+                f"of the controls' cases {longest[UNCHANGED]}, if every lit cell is believed {longest[_EVERY_CELL]}, with "
+                f"rates from Sun vectors bounded to 5 instead of 10 deg/s {longest[_BOUNDED]}, damped in the deadband "
+                f"{longest[_DAMPED]}"
+            )
     return notes
 
 

@@ -19,7 +19,6 @@ from css_studies.figure_style import (
     save,
     shade_dark,
     style,
-    subtitle,
 )
 from css_studies.reproduce.okeefe.configurations import Entry
 from css_studies.reproduce.okeefe.flights import column, curve
@@ -60,7 +59,7 @@ POINTING_ERROR = Quantity(
     "Angle of array normal to true Sun",
     "angle [deg]",
     0.1,
-    ((30.0, "30°, power\npositive"), (15.0, "15°")),
+    ((30.0, "30°"), (15.0, "15°")),
 )
 RATE = Quantity("rate_deg_s", "Body rate", "rate [deg/s]", 1e-3)
 RATE_KNOWLEDGE = Quantity("rate_knowledge_deg_s", "Error of the estimated body rate", "rate [deg/s]", 1e-3)
@@ -85,8 +84,7 @@ def write_against_time(quantity: Quantity, variants: Sequence[Variant], shadow: 
             logarithmic(axes)
             axes.set_ylabel(quantity.label)
             axes.set_title(f"{quantity.title}, {variant.name}")
-        subtitle(all_axes[0], "solid: mean; dotted: 95th percentile; shaded: eclipse")
-        legend(all_axes[0])
+        legend(all_axes[0], title="solid: mean\ndotted: 95 %\nshaded: eclipse")
         all_axes[-1].set_xlim(0.0, float(shadow.time_s[-1]) / _MINUTE)
         all_axes[-1].set_xlabel("time [min]")
         return save(figure, file)

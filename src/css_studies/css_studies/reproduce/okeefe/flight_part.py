@@ -47,7 +47,11 @@ def flight_part(
         Picture(write_against_time(quantity, variants, shadow, folder / f"{name}.png").name, caption)
         for quantity, name, caption in (
             (HEADING_ERROR, "figure_6", "Figure 6. Angle of estimated to true Sun."),
-            (POINTING_ERROR, "pointing_error", "Angle of array normal to true Sun, of which the paper only writes."),
+            (
+                POINTING_ERROR,
+                "pointing_error",
+                "Angle of array normal to true Sun, with 30 deg (power positive) and 15 deg (the paper's deadband).",
+            ),
             (RATE, "figure_7a", "Figure 7a. Body rate."),
             (RATE_KNOWLEDGE, "figure_7b", "Figure 7b. Error of the estimated body rate."),
         )

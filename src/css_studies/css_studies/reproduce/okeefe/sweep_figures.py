@@ -51,7 +51,7 @@ def write_sweep(sweep: Sweep, entries: Sequence[Entry], merits: Mapping[Configur
             axes.set_ylabel(panel.label)
             axes.set_title(panel.title)
         for axes in all_axes[2:]:
-            axes.set_xlabel(f"{sweep.title.lower()}: {sweep.axis}")
+            axes.set_xlabel(sweep.axis)
         all_axes[-1].set_xticks(at, [label for _, label, _ in sweep.points])
         legend(all_axes[1])
         return save(figure, file)

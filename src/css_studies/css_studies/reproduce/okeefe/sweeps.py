@@ -50,21 +50,21 @@ SWEEPS = (
     Sweep(
         "common_scale",
         "Scale error of all cells",
-        "more light than calibrated for",
+        "output of all cells beyond calibration",
         "All cells read too much or too little by the same share, the same in every case.",
         tuple(map(_scale, (0.8, 0.9, 1.0, 1.1, 1.2))),
     ),
     Sweep(
         "cell_scale",
         "Scale error of each cell",
-        "1 sigma",
+        "scale error of each cell, 1 sigma",
         "Each cell has its own normal error of scale, drawn for each case.",
         tuple(map(_spread, (0.0, 0.05, 0.1, 0.15, 0.2))),
     ),
     Sweep(
         "failures",
         "Failed cells",
-        "drawn for each case",
+        "failed cells, drawn for each case",
         "Cells fail before the flight begins, which ones is drawn for each case. Dead cells read nothing, stuck ones "
         "hold an output drawn between dark and full Sun. No estimator looks for failures.",
         tuple(
