@@ -75,8 +75,8 @@ def difference_notes(cases: pa.Table) -> dict[tuple[str, str], str]:
         if not entries[label].gyro:
             notes[label, CONVERGING] = (
                 f"of the controls' cases {longest[UNCHANGED]}, if every lit cell is believed {longest[_EVERY_CELL]}, "
-                f"with rates from Sun vectors bounded to 5 instead of 10 deg/s {longest[_BOUNDED]}, damped in the deadband "
-                f"{longest[_DAMPED]}"
+                f"with rates from Sun vectors bounded to 5 instead of 10 deg/s {longest[_BOUNDED]}, damped in the "
+                f"deadband {longest[_DAMPED]}"
             )
     return notes
 

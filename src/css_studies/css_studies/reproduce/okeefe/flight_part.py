@@ -97,8 +97,8 @@ def settings(mission: Mission, improved: Variant) -> list[str]:
     """What flies where, one line each."""
     control = mission.node("mrp_control").values
     lines = [
-        f"as the paper: K {control.gains.k:g}, P {control.gains.p:g}, K_I {control.gains.ki:g}, deadband "
-        f"{control.deadband_deg:g} deg without torque",
+        f"as the paper: the mission as it is, K {control.gains.k:g} N m, P {control.gains.p:g} N m s, "
+        f"K_I {control.gains.ki:g}, deadband {control.deadband_deg:g} deg ({control.deadband_behaviour} torque)",
     ]
     for entry in improved.entries:
         c = entry.configuration
