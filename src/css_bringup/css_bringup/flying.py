@@ -14,7 +14,7 @@ from css_bringup.composed import ComposedFlight
 from css_bringup.flight import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
 from css_common.mission import Mission
-from css_recording.process import StopSignal
+from css_common.stop_signal import StopSignal
 
 
 def fly(mission: Mission, bag: Path | None, *, processes: bool, console: Console) -> FlightResult:
