@@ -24,6 +24,7 @@ from css_common.mission_file import MissionError
 
 RECORDER = "recorder"
 _POLL = 0.02
+_RESTART_LIMIT = 60.0  # wall time [s] within which a second death of a node ends the run
 
 
 @dataclass
@@ -39,9 +40,9 @@ class Child:
     asked_to_end: bool = False
 
     def start(self) -> None:
-        """Starts the process; its output is appended to its log."""
+        """Starts the process; its log begins anew with the flight and goes on after a restart."""
         self.asked_to_end = False
-        self.stream = self.log.open("ab")
+        self.stream = self.log.open("wb" if self.process is None else "ab")
         # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
         self.process = subprocess.Popen(
             self.command, stdout=self.stream, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
@@ -95,14 +96,14 @@ def executable_path(package: str, executable: str) -> str:
 class Supervisor:
     """Starts, watches and stops the processes of a flight."""
 
-    def __init__(self, mission: Mission, bag: Path | None, logs: Path, restart_limit_s: float = 60.0) -> None:
+    def __init__(self, mission: Mission, bag: Path | None, logs: Path, *, overwrite: bool = False) -> None:
         """Prepares a flight; `start` begins it.
 
         Args:
             mission: what to fly.
             bag: where to record; None records nothing.
             logs: folder for the nodes' logs.
-            restart_limit_s: a node that dies twice within this wall time ends the run.
+            overwrite: replace a recording that is there.
 
         Raises:
             MissionError: an executable is missing, or no node owns simulated time.
@@ -113,7 +114,7 @@ class Supervisor:
         self.bag = bag
         self._plant_name = mission.plant.name
         self.logs = logs
-        self.restart_limit_s = restart_limit_s
+        self._overwrite = overwrite
         self.notes: list[str] = []
         self.failure = ""
         self._folder = tempfile.TemporaryDirectory(prefix="sunpoint_")
@@ -137,6 +138,7 @@ class Supervisor:
     def _recorder(self) -> Child:
         command = [executable_path("css_recording", RECORDER), "--mission", str(self._parameters)]
         command += ["--output", str(self.bag), "--summary", str(self._summary(RECORDER))]
+        command += ["--overwrite"] if self._overwrite else []
         return Child(RECORDER, command, self.logs / f"{RECORDER}.log")
 
     @property
@@ -166,8 +168,8 @@ class Supervisor:
             if child is self.recorder:
                 self._fail(child, code, "the flight is not recorded any more")
                 return False
-            if len(child.deaths) > 1 and now - child.deaths[-2] < self.restart_limit_s:
-                self._fail(child, code, f"for the second time within {self.restart_limit_s:g} s")
+            if len(child.deaths) > 1 and now - child.deaths[-2] < _RESTART_LIMIT:
+                self._fail(child, code, f"for the second time within {_RESTART_LIMIT:g} s")
                 return False
             self.notes.append(f"{child.name} died ({_cause(code)}) and was restarted")
             child.stop(0.0)
@@ -214,6 +216,8 @@ def fly_processes(
     logs: Path,
     on_poll: Callable[[Supervisor], None] | None = None,
     stopped: Stopped = lambda: False,
+    *,
+    overwrite: bool = False,
 ) -> FlightResult:
     """Flies a mission with one process per node.
 
@@ -223,9 +227,10 @@ def fly_processes(
         logs: folder for the nodes' logs.
         on_poll: called between looks at the processes.
         stopped: the flight is asked to end.
+        overwrite: replace a recording that is there.
     """
     result = FlightResult(mission, bag=bag)
-    supervisor = Supervisor(mission, bag, logs)
+    supervisor = Supervisor(mission, bag, logs, overwrite=overwrite)
     try:
         supervisor.start()
         while supervisor.check():
