@@ -18,13 +18,13 @@ from pathlib import Path
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
 from rich.text import Text
 
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
+from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.schedulers import DaskScheduler
 from css_studies.monte_carlo.study_summary import study_object
 
@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace) -> int:
     folder = options.out or _default_folder(mission.name)
     messages = Console(stderr=True, highlight=False)
     begin = time.perf_counter()
-    with _progress_bar(messages) as bar:
+    with progress_bar(messages) as bar:
         task = bar.add_task(mission.name, total=None)
         study = run_study(
             mission,
@@ -152,20 +152,6 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
 def _default_folder(mission: str) -> Path:
     home = Path(os.environ.get("SUNPOINT_HOME", "."))
     return home / "studies" / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
-
-
-def _progress_bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("cases"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )
 
 
 _COLUMNS = (
