@@ -14,8 +14,9 @@ not public; these closed forms stand for them. Radius R, spacecraft at r from th
 with z along the zenith and x toward the Sun. All is lit for psi <= 90 deg - rho, A = 2 pi (1 - cos rho) and
 N = (0, 0, pi sin^2 rho); nothing for psi >= 90 deg + rho. The light comes from R N / |N|; its magnitude, relative to
 the Sun, is reflectivity (R / r)^2 (s.N) / (pi sin^2 rho). Against the integral over patches (`earth_light`) that is
-right to 0.004 while all of the cap is lit. Near the terminator it is too bright, 0.070 against 0.034 with the Sun on
-the horizon at 475 km, and too far from nadir.
+right to 0.005 in magnitude while all of the cap is lit, and to 8 deg in direction, as the integral leans toward the
+brighter side. With the terminator in view it is too bright and too far from nadir: 0.070 against 0.034 and 61 deg
+against 48 with the Sun on the horizon at 475 km.
 
 Both vectors go out as one patch of light, so that `albedo.albedo_output` serves all models.
 """
