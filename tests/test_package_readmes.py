@@ -7,13 +7,22 @@ import pytest
 
 from css_common.schema import default_values
 from css_estimation.nodes.ekf import Ekf
+from css_estimation.nodes.flat import Flat
+from css_estimation.nodes.pyramid_switch import PyramidSwitch
 from css_estimation.nodes.wavg import Wavg
 from css_estimation.nodes.wls import Wls
 from sunpoint_control.nodes.mrp_control import MrpControl
 
 SOURCES = Path(__file__).parents[1] / "src"
 # component, and the parameters with which it shows all of its topics
-COMPONENTS = ((Ekf, {}), (Wavg, {}), (Wls, {}), (MrpControl, {"rods__fitted": True}))
+COMPONENTS = (
+    (Ekf, {"rate__use_field": True}),
+    (Wavg, {}),
+    (Wls, {}),
+    (Flat, {}),
+    (PyramidSwitch, {}),
+    (MrpControl, {"rods__fitted": True}),
+)
 
 
 def rows(text):

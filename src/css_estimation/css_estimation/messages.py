@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from css_common.codec import Sample
-from css_common.vectors import Vec3
+from css_common.vectors import Vec3, vector_of
 from css_estimation.sun_heading import SunHeading
 
-_NO_RATE: Vec3 = (0.0, 0.0, 0.0)
+_NOTHING: Vec3 = (0.0, 0.0, 0.0)
 
 
 def sun_estimate_fields(heading: SunHeading) -> dict[str, Any]:
@@ -35,6 +35,12 @@ def gyro_reading(imu: Sample | None) -> tuple[Vec3, bool]:
     A gyro that is switched off says so by the message's own convention, a first covariance element of -1.
     """
     if imu is None or imu.angular_velocity_covariance[0] == -1.0:
-        return _NO_RATE, False
-    x, y, z = imu.angular_velocity.tolist()
-    return (x, y, z), True
+        return _NOTHING, False
+    return vector_of(imu.angular_velocity), True
+
+
+def field_reading(field: Sample | None) -> tuple[Vec3, bool]:
+    """Field [T] of a sensor_msgs/MagneticField and whether it is a measurement, by the same convention."""
+    if field is None or field.magnetic_field_covariance[0] == -1.0:
+        return _NOTHING, False
+    return vector_of(field.magnetic_field), True
