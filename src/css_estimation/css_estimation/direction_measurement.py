@@ -27,6 +27,12 @@ def no_direction() -> DirectionMeasurement:
 
 
 @kernel
+def widened(m: DirectionMeasurement, variance: float, largest: float) -> DirectionMeasurement:
+    """The measurement with a further error of `variance` in its direction, whose rows are weighted by `largest`."""
+    return DirectionMeasurement(m.rows, m.residual, m.variance + variance * largest, m.dof)
+
+
+@kernel
 def normalised_innovation(covariance, m: DirectionMeasurement) -> float:
     """Normalised innovation squared of the whole direction, chi-square with `m.dof` degrees of freedom."""
     s: Symmetric = congruence(m.rows, attitude_block(covariance))

@@ -45,6 +45,19 @@ def attitude_block(covariance) -> Symmetric:
 
 
 @kernel
+def neglected_variance(covariance) -> float:
+    """Variance of what the linear model of a direction leaves out, of second order in the attitude error.
+
+    A unit vector turned by dtheta differs from its linear prediction by dtheta x (dtheta x s) / 2, of mean square
+    between sigma^4 / 4 across s and 2 sigma^4 along it for an error of sigma about each axis; here sigma^4, as in a
+    second-order filter (Bar-Shalom, Li & Kirubarajan, section 10.3). It keeps a filter that begins far off from
+    believing that its first update has brought it close, and vanishes as it converges.
+    """
+    mean = (covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) / 3.0
+    return mean * mean
+
+
+@kernel
 def propagate(covariance, turn: Mat3, dt: float, angle_noise: float, bias_noise: float, with_gyro: bool) -> None:
     """P of the errors after `dt` [s], Phi P Phi^T + Q (Lefferts, Markley & Shuster 1982, to first order in dt).
 

@@ -58,7 +58,7 @@ class AttitudeFilter(Component):
         self._parameters = attitude_options.parameters(values)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input

@@ -104,16 +104,17 @@ class SurroundingsTables:
 
     Args:
         plant: values of the node that owns the truth (its orbit, shadow and field).
-        estimator: values of the estimator that flies (its eclipse prediction).
+        estimator: values of the estimator that flies (its eclipse prediction); None: none asks for one.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
     """
 
     def __init__(
-        self, plant: Values, estimator: Values, reflectivity: np.ndarray | None, own_earth: bool = False
+        self, plant: Values, estimator: Values | None, reflectivity: np.ndarray | None, own_earth: bool = False
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant)
-        self._prediction = None if estimator.eclipse.source == "sensors" else EclipsePrediction(estimator)
+        predicts = estimator is not None and estimator.eclipse.source != "sensors"
+        self._prediction = EclipsePrediction(estimator) if predicts else None
         self._period_ns = round(plant.mission.period * 1e9)
         self._epoch_ns = parse_utc(plant.mission.epoch)
         self._reflectivity = reflectivity
