@@ -28,7 +28,7 @@ class Partials(NamedTuple):
 
     attitude: Vec3
     first: int  # index of the first calibration error; 0: none
-    count: int  # calibration errors that follow from there, at most 3
+    errors: int  # calibration errors that follow from there, at most 3
     calibration: Vec3
 
 
@@ -104,14 +104,14 @@ def innovate(covariance, work, h: Partials, residual: float, variance: float) ->
     p, n = covariance, covariance.shape[0]
     for i in range(n):
         total = p[i, 0] * h.attitude[0] + p[i, 1] * h.attitude[1] + p[i, 2] * h.attitude[2]
-        for k in range(h.count):
+        for k in range(h.errors):
             total += p[i, h.first + k] * h.calibration[k]
         work[_PRODUCT, i] = total
     innovation, s = residual, variance
     for i in range(3):
         innovation -= h.attitude[i] * work[CORRECTION, i]
         s += h.attitude[i] * work[_PRODUCT, i]
-    for k in range(h.count):
+    for k in range(h.errors):
         innovation -= h.calibration[k] * work[CORRECTION, h.first + k]
         s += h.calibration[k] * work[_PRODUCT, h.first + k]
     return innovation, s

@@ -43,7 +43,7 @@ class AttitudeFilter(Component):
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         if values.calibration.mode != "off" and values.sun_model == "vector":
-            yield f"calibration.mode: {values.calibration.mode} given, but cells are calibrated by sun_model voltage alone"
+            yield f"calibration.mode: {values.calibration.mode} given, but sun_model vector calibrates no cells"
 
     def configure(self) -> None:
         self._parameters = attitude_options.parameters(self.values)

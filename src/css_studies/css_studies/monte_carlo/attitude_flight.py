@@ -17,8 +17,16 @@ from css_estimation import attitude_options, attitude_solution
 from css_estimation.attitude_options import AttitudeParameters, GivenStart
 from css_estimation.flight_references import FlightReferences
 from css_estimation.nodes.attitude_filter import AttitudeFilter
-from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, gyro, initial_conditions, magnetometer, sun_cells
-
+from css_sim import (
+    cell_errors,
+    cell_faults,
+    cell_screen,
+    earth_reflectivity,
+    gyro,
+    initial_conditions,
+    magnetometer,
+    sun_cells,
+)
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
@@ -69,19 +77,19 @@ class AttitudeFlight:
         self.mission = mission
         for node in mission.nodes:
             if node.component not in _PARTS:
-                raise self._error(f"the attitude Monte Carlo has no place for the node {node.name}; fly it on the graph")
+                raise self._error(f"attitude studies have no place for the node {node.name}; fly it on the graph")
         if mission.events:
-            raise self._error("the attitude Monte Carlo has no place for events; fly them on the graph")
+            raise self._error("attitude studies have no place for events; fly them on the graph")
         nodes = [node for node in mission.nodes if node.component is AttitudeFilter]
         if not nodes:
-            raise self._error("graph.nodes: no css_estimation/attitude_filter, which the attitude Monte Carlo needs")
+            raise self._error("graph.nodes: no css_estimation/attitude_filter, which attitude studies need")
         self.filters = [node.name for node in nodes]
         self._plant, self._array, self._gyro = self._part(Dynamics), self._part(CssArray), self._part(Gyro)
         plant, array = self._plant.values, self._array.values
         if plant.wheels.fitted or plant.rods.fitted:
-            raise self._error("wheels.fitted and rods.fitted: the attitude Monte Carlo flies without, expected false")
+            raise self._error("wheels.fitted, rods.fitted: attitude studies fly without, expected false")
         if array.albedo.enabled and array.albedo.draw != "mean":
-            raise self._error(f"css_array: albedo.draw: {array.albedo.draw} given, expected mean: one Earth for all cases")
+            raise self._error(f"css_array: albedo.draw: {array.albedo.draw} given, expected mean")
         earth = None
         if array.albedo.enabled:
             key = random_key(mission.values.mission.seed, mission.values.mission.case)

@@ -113,8 +113,9 @@ class SurroundingsTables:
         self, plant: Values, estimator: Values | None, reflectivity: np.ndarray | None, own_earth: bool = False
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant)
-        predicts = estimator is not None and estimator.eclipse.source != "sensors"
-        self._prediction = EclipsePrediction(estimator) if predicts else None
+        self._prediction: EclipsePrediction | None = None
+        if estimator is not None and estimator.eclipse.source != "sensors":
+            self._prediction = EclipsePrediction(estimator)
         self._period_ns = round(plant.mission.period * 1e9)
         self._epoch_ns = parse_utc(plant.mission.epoch)
         self._reflectivity = reflectivity
