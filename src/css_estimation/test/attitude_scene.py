@@ -5,6 +5,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from css_common.attitude import mrp_to_dcm
+from css_common.kernel import typed_call
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_estimation import attitude_ekf, attitude_options, attitude_solution, flight_references
@@ -14,6 +15,7 @@ FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0
 TABLE = CELLS + attitude_options.PARAMETERS + flight_references.PARAMETERS
 NO_LIGHT = np.zeros(192, np.float32)
 SUN_N = (0.6, 0.0, 0.8)
+_step = typed_call(attitude_ekf.step)
 
 
 def options(normals=FACES, **changes):
@@ -42,7 +44,7 @@ class Scene:
 
     def advance(self, seconds=1.0):
         """The body turns on, its rate slowly turning too."""
-        steps = max(1, round(10 * seconds))
+        steps = max(1, round(4 * seconds))
         for _ in range(steps):
             h = seconds / steps
             self.omega = self.omega + h * 0.01 * np.cross([0.3, -0.2, 1.0], self.omega)
@@ -83,7 +85,7 @@ class Run:
 
     def step(self, scene, dt=1.0, *, voltages=None, gyro=None, field=None, sunlit=True, references=None, valid=True):
         """One cycle on the scene's data, or on what is given in its place."""
-        self.state, self.solution = attitude_ekf.step(
+        self.state, self.solution = _step(
             self.p,
             self.state,
             self.memory,
