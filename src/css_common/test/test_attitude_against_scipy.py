@@ -156,3 +156,5 @@ def test_rotation_vector_to_mrp_against_scipy(direction, exponent):
     expected = Rotation.from_rotvec(phi)
     assert_allclose(attitude.mrp_to_dcm(sigma), expected.as_matrix().T, atol=1e-12, rtol=0.0)
     assert_allclose(attitude.mrp_angle(sigma), expected.magnitude(), atol=1e-11, rtol=1e-9)
+    again = Rotation.from_rotvec(attitude.mrp_to_rotation_vector(sigma))
+    assert (again * expected.inv()).magnitude() < 1e-11

@@ -11,15 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.attitude import mrp_angle, mrp_subtract
+from css_common.attitude import mrp_angle, mrp_subtract, mrp_to_rotation_vector
 from css_common.kernel import kernel
-from css_common.vectors import Vec3, norm, scale, subtract
+from css_common.vectors import Vec3, norm, subtract
 from css_estimation.attitude_solution import VALIDITY_NONE, AttitudeSolution
 from css_estimation.error_covariance import attitude_block
 from css_estimation.symmetric import inverse_form, trace
-
-SETTLED_AFTER = 300.0
-"""Time [s] after which a filter counts as settled: errors before it are reported apart."""
+from css_studies.flight_metrics import SETTLED_AFTER
 
 _DEG = 180.0 / math.pi
 
@@ -97,7 +95,7 @@ def tally_attitude(
         t.error_sum += error
         t.error_max = max(t.error_max, error)
         t.bias_sum += bias_error
-        turn = rotation_vector(difference)
+        turn = mrp_to_rotation_vector(difference)
         t.nees3_sum += inverse_form(attitude_block(covariance), turn)
         t.nees6_sum += _nees(tallies.work, covariance, turn, bias_error_b)
         t.innovations += solution.nis_dof
@@ -108,13 +106,6 @@ def tally_attitude(
         samples = tallies.samples[f, c]
         samples[0, at], samples[1, at] = error, _DEG * math.sqrt(trace(attitude_block(covariance)))
         samples[2, at], samples[3, at] = bias_error, lit
-
-
-@kernel
-def rotation_vector(sigma: Vec3) -> Vec3:
-    """Rotation vector [rad] of an MRP set with |sigma| <= 1."""
-    length = norm(sigma)
-    return scale(4.0 * math.atan(length) / length if length > 1e-8 else 4.0, sigma)
 
 
 @kernel
