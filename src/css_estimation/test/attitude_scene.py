@@ -75,6 +75,14 @@ class Scene:
         return tuple(self.attitude.apply(self.field_n) + 200e-9 * self.noise * self.rng.normal(size=3))
 
 
+def guess(scene, error_deg):
+    """MRP of an attitude that is off by so much about each axis, 1 sigma."""
+    off = Rotation.from_rotvec(np.radians(error_deg) * scene.rng.normal(size=3)) * scene.attitude
+    # A(q) = dcm_bn is the inverse of the rotation that moves vectors
+    x, y, z, w = off.inv().as_quat(canonical=True)
+    return tuple(float(c / (1.0 + w)) for c in (x, y, z))
+
+
 class Run:
     """One filter on a scene."""
 
@@ -120,8 +128,7 @@ class Run:
         estimated = Rotation.from_matrix(np.array(mrp_to_dcm(self.solution.sigma_bn)))
         return float(np.degrees((scene.attitude * estimated.inv()).magnitude()))
 
-
-
-
-
-
+    def heading_error_deg(self, scene):
+        """Angle of estimated to true Sun."""
+        sun_b = np.array(mrp_to_dcm(self.solution.sigma_bn)) @ SUN_N
+        return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(sun_b, scene.sun_b)), sun_b @ scene.sun_b)))
