@@ -107,12 +107,18 @@ class SurroundingsTables:
         estimator: values of the estimator that flies (its eclipse prediction); None: none asks for one.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
+        field: something feels the geomagnetic field.
     """
 
     def __init__(
-        self, plant: Values, estimator: Values | None, reflectivity: np.ndarray | None, own_earth: bool = False
+        self,
+        plant: Values,
+        estimator: Values | None,
+        reflectivity: np.ndarray | None,
+        own_earth: bool = False,
+        field: bool = True,
     ) -> None:
-        self._environment: MissionEnvironment = flight_environment(plant)
+        self._environment: MissionEnvironment = flight_environment(plant, field)
         self._prediction: EclipsePrediction | None = None
         if estimator is not None and estimator.eclipse.source != "sensors":
             self._prediction = EclipsePrediction(estimator)
