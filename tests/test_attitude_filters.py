@@ -40,7 +40,8 @@ def test_both_filters_fly_on_one_graph(flight, tmp_path):
 def test_a_replay_gives_the_bytes_that_flew_and_the_same_errors(flight, tmp_path):
     result, bag = flight
     mission = mission_of_bag(bag, {}, [], None)
-    requests = [parse_request(text) for text in (*NAMES, "attitude_voltage:gyro=off", "attitude_voltage:cells_used=lit")]
+    changed = ("attitude_voltage:gyro=off", "attitude_voltage:cells_used=lit")
+    requests = [parse_request(text) for text in (*NAMES, *changed)]
     again = replay(bag, tmp_path / "replay", mission, requests, {})
     assert all(run.comparison.identical for run in again.replayed[:2])
     assert again.replayed[2].comparison is None and again.messages == 4 * 420

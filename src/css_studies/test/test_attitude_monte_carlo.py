@@ -49,7 +49,7 @@ def test_a_case_is_the_flight_of_the_nodes_bit_for_bit(overrides):
         estimated = columns.validity > 0
         quaternions = [mrp_to_quaternion(tuple(sigma)) for sigma in trace[estimated, :3]]
         np.testing.assert_array_equal(quaternions, columns.q_bn[estimated])
-        steps, errors, nees = attitude_errors(log, name)
+        steps, errors, _ = attitude_errors(log, name)
         samples = result.tallies.samples[f, 1, 0]
         np.testing.assert_allclose(samples[steps], np.degrees(errors), rtol=1e-6)
         totals = result.tallies.totals[f, 1]

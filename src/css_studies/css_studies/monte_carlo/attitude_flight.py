@@ -2,6 +2,9 @@
 """A mission without control as the compiled loop of attitude filters flies it: parts, parameters, cases."""
 
 import math
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import NamedTuple
 
 import numba.typed
@@ -44,6 +47,7 @@ from css_studies.monte_carlo.attitude_loop import (
 )
 from css_studies.monte_carlo.surroundings import BLOCK_STEPS, SurroundingsTables, aligned_table
 
+_CHUNK_CASES = 10
 _PARTS = (Dynamics, CssArray, Gyro, Magnetometer, AttitudeFilter)
 
 
@@ -189,3 +193,32 @@ class AttitudeFlight:
 
     def _error(self, reason: str) -> MissionError:
         return MissionError(f"{self.mission.origin}: {reason}")
+
+
+def fly_in_threads(
+    flight: AttitudeFlight,
+    cases: int,
+    sample_every: int = 1,
+    guess_deg: float = 0.0,
+    progress: Callable[[int, int], None] | None = None,
+) -> AttitudeTallies:
+    """Tallies of cases 0 to `cases` - 1, flown side by side; arguments of `AttitudeFlight.fly`.
+
+    Args:
+        progress: told how many cases are done, and of how many.
+    """
+    chunks = [np.arange(first, min(first + _CHUNK_CASES, cases)) for first in range(0, cases, _CHUNK_CASES)]
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        futures = [pool.submit(flight.fly, numbers, sample_every, guess_deg) for numbers in chunks]
+        done = 0
+        for numbers, future in zip(chunks, futures, strict=True):
+            future.result()
+            done += len(numbers)
+            if progress is not None:
+                progress(done, cases)
+    parts = [future.result().tallies for future in futures]
+    return parts[0]._replace(
+        totals=np.concatenate([part.totals for part in parts], axis=1),
+        lit=np.concatenate([part.lit for part in parts], axis=1),
+        samples=np.concatenate([part.samples for part in parts], axis=1),
+    )
