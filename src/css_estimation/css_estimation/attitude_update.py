@@ -158,8 +158,11 @@ def _take_direction(p, state, memory, m: DirectionMeasurement, tally: Tally, sou
     taken = nis <= _GATES[m.dof - 1] or (nis < math.inf and not _is_converged(p, memory))
     if not taken:
         return state, Tally(tally.nis, tally.taken, True, tally.lit_mask, tally.used)
-    update_direction(memory.covariance, memory.work, m)
-    return _corrected(p, state, memory), Tally(
+    calibrates = p.cells.calibration.estimated
+    update_direction(memory.covariance, memory.work, m, memory.covariance.shape[0] if calibrates else CALIBRATION)
+    state = _corrected(p, state, memory)
+    cell_calibration.correct(p.cells.calibration, memory.calibration, memory.work[CORRECTION])
+    return state, Tally(
         tally.nis + nis, tally.taken + m.dof, tally.refused, tally.lit_mask | mask, tally.used | source
     )
 

@@ -39,7 +39,7 @@ def test_scale_errors_of_five_to_twenty_percent_are_found(calibrated):
 
 
 def test_the_heading_gains_by_calibration(calibrated):
-    """Against a filter that knows of the errors and trusts the cells less, the best it can do without calibration."""
+    """Against a filter that knows of the errors and trusts the cells less: what it can do without calibration."""
     trusting = [fly(seed, cell_sigma=0.1) for seed in (1, 2, 3)]
     gained = np.mean([heading for _, heading, _ in calibrated])
     assert gained < 0.6 * np.mean([heading for _, heading, _ in trusting])
@@ -60,5 +60,8 @@ def test_alignment_is_found_too():
     tilted /= np.linalg.norm(tilted, axis=1, keepdims=True)
     changes = {"calibration__mode": "estimate", "calibration__alignment": True, "calibration__scale_sigma": 0.15}
     scene_run, heading, _ = fly(4, normals=tilted, **changes)
-    assert np.abs(scene_run.memory.calibration[:, 0] - SCALES).max() < 0.03
+    off = np.abs(scene_run.memory.calibration[:, 0] - SCALES)
+    # the Sun may meet a cell at one angle alone, which its scale and its tilt explain equally well: it says so
+    assert (off < 4.0 * np.sqrt(np.diag(scene_run.memory.covariance)[6::3])).all()
+    assert np.count_nonzero(off < 0.01) >= 4
     assert heading < 0.8 * fly(4, normals=tilted, calibration__mode="estimate", calibration__scale_sigma=0.15)[1]
