@@ -60,10 +60,12 @@ def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) ->
     """The table and the figures of the flight."""
     if runs:
         console.print(summary_table(runs))
-    console.print(
-        f"{result.simulated_s:.1f} s simulated in {result.wall_s:.1f} s wall, {result.cpu_s:.1f} s CPU: "
-        f"{result.realtime_factor:.0f} times real time"
-    )
+    simulated = f"{result.simulated_s:.1f} s simulated"
+    if result.wall_s > 0.0:  # a plant that was killed took its times with it
+        simulated += (
+            f" in {result.wall_s:.1f} s wall, {result.cpu_s:.1f} s CPU: {result.realtime_factor:.0f} times real time"
+        )
+    console.print(simulated)
     if result.bag is not None:
         console.print(
             f"{result.messages_recorded} messages recorded, {result.messages_lost} lost: {result.bag}", soft_wrap=True
