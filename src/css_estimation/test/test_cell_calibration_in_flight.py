@@ -34,7 +34,10 @@ def test_scale_errors_of_five_to_twenty_percent_are_found(calibrated):
     for run, _, _ in calibrated:
         found = run.memory.calibration[:, 0]
         sigma = np.sqrt(np.diag(run.memory.covariance)[6:])
-        assert np.abs(found - SCALES).max() < 0.02
+        # in some tumbles the Sun never comes near the normal of one face
+        seen = sigma < 0.02
+        assert np.count_nonzero(seen) >= 5
+        assert np.abs(found - SCALES)[seen].max() < 0.02
         assert (np.abs(found - SCALES) < 4.0 * sigma).all()
 
 

@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import numpy as np
+from matplotlib.ticker import MaxNLocator
 
 from css_studies.figure_style import BLUE, VERMILION, draw_series, legend, logarithmic, new_figure, save, style
 from css_studies.monte_carlo.percentiles import over_cases
@@ -30,6 +31,7 @@ def write_case(flown: Flown, case: int, title: str, file: Path) -> Path:
         bounds.set_ylabel("3 sigma\n[deg]")
         lit.set_title("Diodes that contribute")
         lit.set_ylabel("number")
+        lit.yaxis.set_major_locator(MaxNLocator(integer=True))
         lit.set_xlabel("time [min]")
         for axes in (errors, bounds):
             logarithmic(axes)
