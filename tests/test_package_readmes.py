@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from css_common.schema import default_values
+from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.nodes.flat import Flat
 from css_estimation.nodes.pyramid_switch import PyramidSwitch
@@ -16,6 +17,7 @@ from sunpoint_control.nodes.mrp_control import MrpControl
 SOURCES = Path(__file__).parents[1] / "src"
 # component, and the parameters with which it shows all of its topics
 COMPONENTS = (
+    (AttitudeFilter, {}),
     (Ekf, {"rate__use_field": True}),
     (Wavg, {}),
     (Wls, {}),
