@@ -94,7 +94,14 @@ def _root(motion: PayloadMotion, geometry: SlitGeometry, head: int, slit: int, s
 
 @kernel
 def slit_crossings(
-    motion: PayloadMotion, geometry: SlitGeometry, sun_n: Vec3, start: float, end: float, times_out, slits_out, heads_out
+    motion: PayloadMotion,
+    geometry: SlitGeometry,
+    sun_n: Vec3,
+    start: float,
+    end: float,
+    times_out,
+    slits_out,
+    heads_out,
 ) -> int:
     """All crossings after `start`, up to and with `end` [s after the epoch], in the order of time.
 

@@ -111,7 +111,7 @@ def payload_motion(values: Values, epoch_ns: int, key: RandomKey) -> PayloadMoti
     first_roll, first_phase = (_FULL_TURN * u for u in uniform4(key, Stream.SPIN_PHASE, 0, 0)[:2])
     starts = [*p.phase_starts.tolist()]
     ends = [*starts[1:], p.flat_spin_start]
-    phases = []
+    phases: list[tuple] = []
     dcm_hn = _momentum_frame(values, epoch_ns)
     psi, phi = first_roll, first_phase
     fastest = 0.0

@@ -2,6 +2,7 @@
 """Slit crossings against closed forms and a search by other means; the timer behind them."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,9 +30,7 @@ def crossings(motion, geometry, start, end, room=4000):
 @given(sun_angle=st.floats(-55.0, 55.0), spin=st.floats(0.5, 8.0), case=st.integers(0, 1000))
 def test_a_fixed_axis_gives_the_intervals_of_the_paper(sun_angle, spin, case):
     """sin(arc/2) = tan SA / tan 60 (Eq. 4), the vertical slit half-way, the upper first for a Sun above."""
-    motion = motion_of(
-        case, payload__coning_angle_deg=[0.0], payload__spin_hz=[spin], payload__coning_period=[10.0]
-    )
+    motion = motion_of(case, payload__coning_angle_deg=[0.0], payload__spin_hz=[spin], payload__coning_period=[10.0])
     k = np.array(payload_state(motion, 0.0).dcm_bn)[2]
     across = np.cross(k, [0.3, 0.4, 0.5])
     across /= np.linalg.norm(across)
@@ -57,7 +56,7 @@ def test_crossings_are_those_that_a_dense_search_finds():
     for slit in (UPPER, VERTICAL, LOWER):
 
         def off(t, slit=slit):
-            x, y, z = np.array(payload_state(motion, t).dcm_bn) @ SUN_N
+            _, y, z = np.array(payload_state(motion, t).dcm_bn) @ SUN_N
             return y - (1 - slit) * math.tan(math.radians(30.0)) * z
 
         grid = np.linspace(68.0, 71.0, 6001)
@@ -78,7 +77,7 @@ def test_steps_of_any_length_give_the_same_crossings(step):
     geometry = slit_geometry(payload_values(slits__head_azimuths_deg=[0.0, 130.0]))
     whole = crossings(motion, geometry, 60.0, 64.0)
     edges = np.append(np.arange(60.0, 64.0 - 1e-9, step), 64.0)
-    parts = [crossings(motion, geometry, a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [crossings(motion, geometry, a, b) for a, b in pairwise(edges)]
     np.testing.assert_allclose(np.concatenate([p[0] for p in parts]), whole[0], atol=1e-11)
     np.testing.assert_array_equal(np.concatenate([p[1] for p in parts]), whole[1])
     np.testing.assert_array_equal(np.concatenate([p[2] for p in parts]), whole[2])
