@@ -88,10 +88,10 @@ def measure(p: SlitParameters, swing: Swing, passage: Passage, azimuth: float) -
     Its covariance counts whole counts and jitter, and the motion of the axis during the passage as far as the swing
     of the last Sun angles tells it.
     """
-    angle = slit_angles.sun_angle(passage.count, passage.turn, p.inclination)
+    angle = slit_angles.sun_angle(passage.interval, passage.turn, p.inclination)
     rate = slit_angles.rotation_rate(passage.turn, p.frequency)
     swing = _swung(swing, angle)
-    variance = slit_angles.counting_variance(passage.count, passage.turn, p.inclination, p.jitter)
+    variance = slit_angles.counting_variance(passage.interval, passage.turn, p.inclination, p.jitter)
     variance += slit_angles.motion_variance(angle, p.inclination, p.inertia_ratio, swing.variance)
     azimuth_variance = (rate / p.frequency) ** 2 * (_TIME_VARIANCE + p.jitter * p.jitter)
     covariance = slit_angles.sun_covariance(angle, azimuth, variance, azimuth_variance)

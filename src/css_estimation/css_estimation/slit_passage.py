@@ -83,8 +83,9 @@ class Passage(NamedTuple):
 
     measured: bool
     reason: int
-    count: int  # COUNT, signed
+    interval: int  # COUNT, signed
     turn: int  # RCOUNT
+    upper: int  # count at the upper pulse
     vertical: int  # count at the vertical pulse
 
 
@@ -106,7 +107,7 @@ def initial_state() -> HeadState:
 
 @kernel
 def _refused(reason: int) -> Passage:
-    return Passage(False, reason, 0, 0, 0)
+    return Passage(False, reason, 0, 0, 0, 0)
 
 
 @kernel
@@ -203,14 +204,14 @@ def _evaluated(p: PassageParameters, s: HeadState) -> tuple[HeadState, Passage]:
                 turn, candidate, agreeing = given, _NONE, 0
         else:
             turn = given
-    count = s.lower - s.upper
+    interval = s.lower - s.upper
     if reason == REASON_NONE:
         tolerance = _DISORDER * turn
-        if 2 * abs(count) > turn:
+        if 2 * abs(interval) > turn:
             reason = REASON_COUNT
         elif not min(s.upper, s.lower) - tolerance <= s.vertical <= max(s.upper, s.lower) + tolerance:
             reason = REASON_ORDER
     state = HeadState(s.upper, s.vertical, s.lower, s.last, s.previous_upper, turn, candidate, agreeing, True)
     if reason != REASON_NONE:
         return state, _refused(reason)
-    return state, Passage(True, REASON_NONE, count, turn, s.vertical)
+    return state, Passage(True, REASON_NONE, interval, turn, s.upper, s.vertical)

@@ -95,7 +95,7 @@ class SlitPassages(Component):
         common = {"refused": self._refused, "validity": validity, "reason": reason}
         if self._newest is None:
             nothing = {name: 0.0 for name in ("sun_angle", "sun_angle_sigma", "rate", "age")}
-            counts = {name: 0 for name in ("count", "turn", "vertical", "head")}
+            counts = {name: 0 for name in ("count", "turn", "upper", "vertical", "head")}
             return {"sun_b": np.zeros(3), "covariance": np.zeros(9), **nothing, **counts, **common}
         head, passage, angle = self._newest
         return {
@@ -105,8 +105,9 @@ class SlitPassages(Component):
             "sun_angle_sigma": angle.sigma,
             "rate": angle.rate,
             "age": max(0.0, (timer - passage.vertical - HALF_COUNT) / self._p.frequency),
-            "count": passage.count,
+            "count": passage.interval,
             "turn": passage.turn,
+            "upper": passage.upper % 2**32,
             "vertical": passage.vertical % 2**32,
             "head": head,
             **common,
