@@ -89,6 +89,7 @@ CELLS: Table = (
 )
 
 WHEELS: Table = (
+    flag("wheels.fitted", True, "the spacecraft carries reaction wheels; without them it flies uncontrolled"),
     reals(
         "wheels.axes",
         (0.0, _R, _R, 0.0, _R, -_R, _R, -_R, 0.0, -_R, -_R, 0.0),
@@ -240,6 +241,11 @@ SECTIONS: dict[str, Table] = {
     "lockstep": LOCKSTEP,
     "io": IO,
 }
+
+
+def wheel_axes(values: Values) -> np.ndarray:
+    """Spin axes (N, 3) of the reaction wheels that the spacecraft carries, in b; none without wheels."""
+    return values.wheels.axes if values.wheels.fitted else np.zeros((0, 3))
 
 
 def conflicts(values: Values) -> Iterator[str]:

@@ -14,6 +14,7 @@ from css_environment import ephemeris
 from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS
 from css_environment.ephemeris import EnvironmentState, Ephemeris
+from css_environment.magnetic_field import HIGHEST_DEGREE
 from css_environment.orbit import Orbit, TleOrbit, keplerian_orbit
 
 # Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
@@ -59,18 +60,22 @@ def mission_orbit(values: Values) -> Orbit:
 class MissionEnvironment:
     """Environment of the mission's `orbit` section."""
 
-    def __init__(self, values: Values, *, field: bool, conical_shadow: bool = True) -> None:
+    def __init__(
+        self, values: Values, *, field: bool, conical_shadow: bool = True, field_degree: int = HIGHEST_DEGREE
+    ) -> None:
         """Prepares the tables.
 
         Args:
             values: sections mission and orbit.
             field: compute the geomagnetic field; else it is zero.
             conical_shadow: shape of the Earth's shadow, with a penumbra or a cylinder.
+            field_degree: highest degree of the field's spherical harmonics.
         """
         self._orbit = mission_orbit(values)
         self._epoch_ns = parse_utc(values.mission.epoch)
         self._field = field
         self._conical_shadow = conical_shadow
+        self._field_degree = field_degree
         self._tables: Ephemeris | None = None
         self._at = typed_call(ephemeris.at)
 
@@ -84,6 +89,7 @@ class MissionEnvironment:
                 start_s,
                 field=self._field,
                 conical_shadow=self._conical_shadow,
+                field_degree=self._field_degree,
             )
         return self._tables
 
