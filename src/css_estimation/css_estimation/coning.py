@@ -96,7 +96,7 @@ def analyse_coning(passages: Passages, inclination: float, inertia_ratio: float 
     if len(passages.time) < LEAST_SAMPLES or passages.time[-1] <= passages.time[0]:
         return None
     time, angle = passages.time, passages.angle
-    spin = float(np.mean(passages.rate)) / (2.0 * np.pi)
+    spin = 1.0 / float(np.mean(2.0 * np.pi / passages.rate))  # the mean of turns, not of rates
     largest = max_min_angle(angle)
     found = candidates(time, angle, spin, 0.5 * largest)
     if not found:

@@ -44,14 +44,29 @@ def detrended(time: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return angle - np.polyval(np.polyfit(time - time[0], angle, 1), time - time[0])
 
 
+def sequence_numbers(time: np.ndarray) -> np.ndarray:
+    """(M,) which passage each sample is of, from 0: whole multiples of the usual time between them."""
+    steps = np.diff(time)
+    return np.concatenate(([0], np.cumsum(np.maximum(np.rint(steps / np.median(steps)), 1.0)))).astype(np.int64)
+
+
 def fourier_spectrum(time: np.ndarray, angle: np.ndarray) -> Spectrum:
-    """Amplitudes of the sequence as if its times (M,) [s] were equidistant, the paper's method; Hann window."""
-    count = len(time)
-    window = np.hanning(count)
-    length = _OVERSAMPLING * count
-    rate = (count - 1) / (time[-1] - time[0])
-    amplitude = np.abs(np.fft.rfft(detrended(time, angle) * window, length)) / (0.5 * window.sum())
-    return Spectrum(np.fft.rfftfreq(length, 1.0 / rate), amplitude)
+    """Amplitudes of the sequence as if its times (M,) [s] were equidistant, the paper's method; Hann window.
+
+    Passages that are missing are filled in between their neighbours, so that what follows keeps its phase.
+    """
+    number = sequence_numbers(time)
+    whole = np.arange(number[-1] + 1)
+    sequence = np.interp(whole, number, detrended(time, angle))
+    window = np.hanning(len(whole))
+    length = _OVERSAMPLING * len(whole)
+    amplitude = np.abs(np.fft.rfft(sequence * window, length)) / (0.5 * window.sum())
+    return Spectrum(np.fft.rfftfreq(length, 1.0 / sampling_rate(time)), amplitude)
+
+
+def sampling_rate(time: np.ndarray) -> float:
+    """Mean passages a second [Hz], those that are missing counted."""
+    return float(sequence_numbers(time)[-1] / (time[-1] - time[0]))
 
 
 def peak_frequency(spectrum: Spectrum) -> float:
@@ -89,7 +104,7 @@ def candidates(time: np.ndarray, angle: np.ndarray, spin: float, half_angle: flo
         spin: turns a second [Hz].
         half_angle: [rad] of the cone, for the moments of inertia that each candidate implies.
     """
-    rate = (len(time) - 1) / (time[-1] - time[0])
+    rate = sampling_rate(time)
     base = peak_frequency(fourier_spectrum(time, angle))
     result = []
     for sequence_frequency in alias_frequencies(base, rate, _LARGEST_RATIO * spin):

@@ -13,8 +13,8 @@ from css_common.vectors import Vec3
 from css_estimation.symmetric import Symmetric, add_outer, isotropic
 
 _HALF_TURN = math.pi
-# Variance of the difference of two times that are each cut to whole counts [counts^2].
-_CUT_VARIANCE = 1.0 / 6.0
+# Variance of a time that is cut to whole counts [counts^2].
+CUT_VARIANCE = 1.0 / 12.0
 _RATIOS = 16
 
 
@@ -58,9 +58,13 @@ def quantum(count: int, turn: int, inclination: float) -> float:
 
 @kernel
 def counting_variance(count: int, turn: int, inclination: float, jitter_counts: float) -> float:
-    """Variance of the Sun angle [rad^2] from whole counts and from jitter [counts, 1 sigma] of each pulse."""
-    of_interval = _CUT_VARIANCE + 2.0 * jitter_counts**2
-    return quantum(count, turn, inclination) ** 2 * of_interval * (1.0 + (count / turn) ** 2)
+    """Variance of the Sun angle [rad^2] from whole counts and from jitter [counts, 1 sigma] of each pulse.
+
+    COUNT and RCOUNT end and begin at one upper pulse, whose error counts in both.
+    """
+    share = count / turn
+    of_pulses = (CUT_VARIANCE + jitter_counts**2) * (1.0 + (1.0 + share) ** 2 + share**2)
+    return quantum(count, turn, inclination) ** 2 * of_pulses
 
 
 @kernel

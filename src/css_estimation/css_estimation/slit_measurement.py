@@ -20,7 +20,6 @@ PARAMETERS: Table = (
 
 # A cut count lies half a count before the pulse, on average.
 HALF_COUNT = 0.5
-_TIME_VARIANCE = 1.0 / 12.0
 # Weight of a new sample in the mean swing: some 30 samples are remembered; the prior counts as a few.
 _WEIGHT = 0.03
 _PRIOR_SAMPLES = 3
@@ -93,6 +92,6 @@ def measure(p: SlitParameters, swing: Swing, passage: Passage, azimuth: float) -
     swing = _swung(swing, angle)
     variance = slit_angles.counting_variance(passage.interval, passage.turn, p.inclination, p.jitter)
     variance += slit_angles.motion_variance(angle, p.inclination, p.inertia_ratio, swing.variance)
-    azimuth_variance = (rate / p.frequency) ** 2 * (_TIME_VARIANCE + p.jitter * p.jitter)
+    azimuth_variance = (rate / p.frequency) ** 2 * (slit_angles.CUT_VARIANCE + p.jitter * p.jitter)
     covariance = slit_angles.sun_covariance(angle, azimuth, variance, azimuth_variance)
     return swing, SunAngle(slit_angles.sun_vector(angle, azimuth), covariance, angle, math.sqrt(variance), rate)

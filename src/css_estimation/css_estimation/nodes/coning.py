@@ -24,7 +24,9 @@ class Coning(Component):
 
     shared = ("slits",)
     parameters = (
-        reals("legs", (0.0, 1e6), "s", "windows of steady motion after the epoch, a row of start and end each", columns=2),
+        reals(
+            "legs", (0.0, 1e6), "s", "windows of steady motion after the epoch, a row of start and end each", columns=2
+        ),
         real("interval", 30.0, "s", "time from estimate to estimate within a leg", low=0.1, high=1e6),
         real("inertia_ratio", 0.0, "-", "axial over transverse moment of inertia; 0: unknown", low=0.0, high=2.0),
     )
