@@ -68,10 +68,11 @@ def test_another_parameter_is_another_estimate(flight, tmp_path):
     first, second = (messages_by_topic(tmp_path / "replay")[f"/{run.label}/sun_estimate"] for run in result.replayed)
     assert result.replayed[1].comparison is None
     assert first != second
+    assert [run["estimator"] for run in result.runs] == ["wavg", "wavg:gate=0.9"]
 
 
 @pytest.mark.parametrize(
-    "request_text", ["nonsense", "ekf:gyro=maybe", "ekf:gate", "ekf:no_such_key=1", "ekf:use_gyro=2"]
+    "request_text", ["nonsense", "ekf:gyro=maybe", "ekf:gate", "ekf:no_such_key=1", "ekf:use_gyro=2", "gyro"]
 )
 def test_what_cannot_be_replayed_is_refused_in_one_line(flight, tmp_path, request_text):
     with pytest.raises(MissionError) as caught:

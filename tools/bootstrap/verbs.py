@@ -25,6 +25,7 @@ VERBS = {
     "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_studies", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_studies", "coverage"),
+    "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_studies", "reproduce"),
     "test": Verb("run ruff, mypy and all tests; arguments go to pytest"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
 }

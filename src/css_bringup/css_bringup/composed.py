@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
-from css_bringup.flight import FlightResult, Progress
+from css_bringup.flight import FlightResult, Progress, Stopped
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
@@ -78,8 +78,8 @@ class ComposedFlight:
         assert isinstance(node, PlantNode)
         return node
 
-    def fly(self, progress: Progress | None = None) -> FlightResult:
-        """Flies the mission to its end, or until interrupted."""
+    def fly(self, progress: Progress | None = None, stopped: Stopped = lambda: False) -> FlightResult:
+        """Flies the mission to its end, or until stopped or interrupted."""
         result = FlightResult(self.mission, bag=self.bag)
         for node in self.nodes.values():
             if node is not self.plant and not node.start():
@@ -90,19 +90,26 @@ class ComposedFlight:
             return result
         plant = self.plant
         try:
+            recorder = self.recorder
+
+            def over() -> bool:
+                return plant.done or stopped() or (recorder is not None and bool(recorder.failure))
+
             # until the first step is out, partners are being matched: not part of the flight's time
-            self._spin(lambda: plant.begun or plant.done, None)
+            self._spin(lambda: plant.begun or over(), None)
             gc.collect()
             gc.freeze()
             wall, cpu = time.perf_counter(), time.process_time()
             try:
-                self._spin(lambda: plant.done, progress)
+                self._spin(over, progress)
             finally:
                 result.wall_s = time.perf_counter() - wall
                 result.cpu_s = time.process_time() - cpu
                 gc.unfreeze()
+            result.interrupted = not plant.done and stopped()
         except (KeyboardInterrupt, ExternalShutdownException):
             result.interrupted = True
+        plant.halt()
         self._settle(result)
         return result
 
@@ -117,6 +124,8 @@ class ComposedFlight:
             self.recorder.close()
             topics = {f"/{topic}" for topic in self.mission.topics}
             result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
+            if self.recorder.failure:
+                result.failure = f"the flight is not recorded any more: {self.recorder.failure}"
         if plant.counters["partners_lost"]:
             result.notes.append(f"{plant.counters['partners_lost']} partners fell silent")
 

@@ -12,6 +12,9 @@ from css_common.mission import Mission
 Progress = Callable[[float], None]
 """Called now and then with the simulated seconds flown."""
 
+Stopped = Callable[[], bool]
+"""True once the flight is asked to end early."""
+
 
 @dataclass
 class FlightResult:

@@ -2,20 +2,23 @@
 """Flying with progress on the terminal, in one process or several."""
 
 import os
+import sys
 from contextlib import nullcontext
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from css_bringup.composed import ComposedFlight
 from css_bringup.flight import FlightResult
-from css_bringup.processes import fly_processes
+from css_bringup.processes import Supervisor, fly_processes
 from css_common.mission import Mission
+from css_recording.process import StopSignal
 
 
 def fly(mission: Mission, bag: Path | None, *, processes: bool, console: Console) -> FlightResult:
-    """Flies a mission to its end.
+    """Flies a mission to its end, or until Ctrl-C or SIGTERM, after which the recording is complete up to there.
 
     Args:
         mission: what to fly.
@@ -23,18 +26,35 @@ def fly(mission: Mission, bag: Path | None, *, processes: bool, console: Console
         processes: one process per node instead of one for all.
         console: where progress is shown, when it is a terminal.
     """
-    if processes:
-        home = Path(os.environ.get("SUNPOINT_HOME", "."))
-        logs = home / "log" / "flights" / (bag.name if bag else mission.name)
-        with console.status(f"flying {mission.name}, one process per node; logs in {logs}") if _live(
-            console
-        ) else nullcontext():
-            return fly_processes(mission, bag, logs)
+    # noted, not raised: an exception would tear a cycle apart, and a second Ctrl-C the clean-up
+    with StopSignal() as stop:
+        if processes:
+            return _fly_processes(mission, bag, console, stop)
+        return _fly_composed(mission, bag, console, stop)
+
+
+def _fly_processes(mission: Mission, bag: Path | None, console: Console, stop: StopSignal) -> FlightResult:
+    home = Path(os.environ.get("SUNPOINT_HOME", "."))
+    logs = home / "log" / "flights" / (bag.name if bag else mission.name)
+    status = f"flying {mission.name}, one process per node; logs in {logs}"
+    named = 0
+
+    def name_restarts(supervisor: Supervisor) -> None:
+        nonlocal named
+        for note in supervisor.notes[named:]:
+            print(note, file=sys.stderr, flush=True)
+        named = len(supervisor.notes)
+
+    with console.status(escape(status)) if _live(console) else nullcontext():
+        return fly_processes(mission, bag, logs, name_restarts, lambda: stop.came)
+
+
+def _fly_composed(mission: Mission, bag: Path | None, console: Console, stop: StopSignal) -> FlightResult:
     with ComposedFlight(mission, bag) as flight:
         if not _live(console):
-            return flight.fly()
+            return flight.fly(stopped=lambda: stop.came)
         bar = Progress(
-            TextColumn(f"flying {mission.name}"),
+            TextColumn(f"flying {escape(mission.name)}"),
             BarColumn(),
             TextColumn("{task.completed:.0f} of {task.total:.0f} s simulated"),
             TimeElapsedColumn(),
@@ -44,7 +64,7 @@ def fly(mission: Mission, bag: Path | None, *, processes: bool, console: Console
         )
         with bar:
             task = bar.add_task("", total=mission.values.mission.duration)
-            return flight.fly(lambda seconds: bar.update(task, completed=seconds))
+            return flight.fly(lambda seconds: bar.update(task, completed=seconds), lambda: stop.came)
 
 
 def _live(console: Console) -> bool:

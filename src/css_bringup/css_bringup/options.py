@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
+from rich.text import Text
 
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
@@ -16,8 +17,9 @@ FAILED = 1
 USAGE = 2
 INTERRUPTED = 130
 
-console = Console(stderr=False, highlight=False)
-errors = Console(stderr=True, highlight=False)
+# without markup: units, paths and what people type may hold brackets
+console = Console(stderr=False, highlight=False, markup=False)
+errors = Console(stderr=True, highlight=False, markup=False)
 
 
 def add_mission_options(parser: argparse.ArgumentParser) -> None:
@@ -65,12 +67,21 @@ def add_output_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
 
 
+def complain(heading: str, text: object = "") -> None:
+    """One line on standard error with its heading in red."""
+    errors.print(Text(heading, style="red"), str(text), soft_wrap=True)
+
+
+class FiguresError(Exception):
+    """Figures that cannot be written, with the folder and the reason."""
+
+
 def guarded(command: Callable[[], int]) -> int:
     """Runs a command; what the user got wrong becomes one line and exit code 2, Ctrl-C becomes 130."""
     try:
         return command()
-    except (MissionError, BagError) as error:
-        errors.print(f"[red]error:[/red] {error}", soft_wrap=True)
+    except (MissionError, BagError, FiguresError) as error:
+        complain("error:", error)
         return USAGE
     except KeyboardInterrupt:
         errors.print("interrupted")

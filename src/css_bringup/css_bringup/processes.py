@@ -18,7 +18,7 @@ from typing import IO, Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
-from css_bringup.flight import FlightResult
+from css_bringup.flight import FlightResult, Stopped
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 
@@ -36,9 +36,11 @@ class Child:
     process: subprocess.Popen | None = None
     stream: IO[bytes] | None = None
     deaths: list[float] = field(default_factory=list)
+    asked_to_end: bool = False
 
     def start(self) -> None:
         """Starts the process; its output is appended to its log."""
+        self.asked_to_end = False
         self.stream = self.log.open("ab")
         # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
         self.process = subprocess.Popen(
@@ -50,8 +52,9 @@ class Child:
         return self.process.poll() if self.process else None
 
     def interrupt(self) -> None:
-        """Asks the process to end, if it runs."""
-        if self.process is not None and self.process.poll() is None:
+        """Asks the process to end, if it runs; once, because an interpreter that is ending dies of a second SIGINT."""
+        if self.process is not None and self.process.poll() is None and not self.asked_to_end:
+            self.asked_to_end = True
             self.process.send_signal(signal.SIGINT)
 
     def stop(self, limit: float) -> None:
@@ -205,7 +208,11 @@ def _cause(code: int) -> str:
 
 
 def fly_processes(
-    mission: Mission, bag: Path | None, logs: Path, on_poll: Callable[[Supervisor], None] | None = None
+    mission: Mission,
+    bag: Path | None,
+    logs: Path,
+    on_poll: Callable[[Supervisor], None] | None = None,
+    stopped: Stopped = lambda: False,
 ) -> FlightResult:
     """Flies a mission with one process per node.
 
@@ -214,12 +221,16 @@ def fly_processes(
         bag: where to record; None records nothing.
         logs: folder for the nodes' logs.
         on_poll: called between looks at the processes.
+        stopped: the flight is asked to end.
     """
     result = FlightResult(mission, bag=bag)
     supervisor = Supervisor(mission, bag, logs)
     try:
         supervisor.start()
         while supervisor.check():
+            if stopped():
+                result.interrupted = True
+                break
             if on_poll is not None:
                 on_poll(supervisor)
             time.sleep(_POLL)

@@ -99,6 +99,7 @@ class Replayed:
 
     Attributes:
         label: its name in the new recording.
+        changed: what was asked of it besides its gyro, as KEY=VALUE,...
         node: its component and values.
         component: the component being stepped.
         matcher: brings its inputs together.
@@ -108,6 +109,7 @@ class Replayed:
     """
 
     label: str
+    changed: str
     node: Node
     component: Component
     matcher: Matcher
@@ -212,7 +214,7 @@ class Replay:
     def _add(self, request: EstimatorRequest) -> None:
         if any(run.label == request.label for run in self.runs):
             raise MissionError(f"estimator {request.label} is asked for twice")
-        flown = next((n for n in self.mission.nodes if n.name == request.kind), None)
+        flown = next((n for n in self.mission.nodes if n.name == request.kind and n.package == ESTIMATORS), None)
         base = flown or self.mission.node_of(find_component(ESTIMATORS, request.kind, "replay"), request.kind)
         node = self._changed(base, request) if request.changes else base
         component = base.component(request.label, node.values)
@@ -224,7 +226,8 @@ class Replay:
                 f"{', '.join(sorted(self._recorded)) or 'nothing'} (--remap OLD:=NEW gives a topic its name)"
             )
         awaited = [i.key for i in inputs if i.required or absolute(i.topic) in self._recorded]
-        run = Replayed(request.label, node, component, Matcher(component, inputs, awaited))
+        changed = ",".join(f"{key}={value}" for key, value in request.changes.items() if key != "use_gyro")
+        run = Replayed(request.label, changed, node, component, Matcher(component, inputs, awaited))
         for output in base.component.outputs(request.label, node.values):
             run.outputs[output.key] = (absolute(output.topic), codec_of(output.message_type))
         if flown is not None and node.canonical == flown.canonical:

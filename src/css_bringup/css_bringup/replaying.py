@@ -144,7 +144,7 @@ def _named(run: Replayed, figures: Run) -> Run:
     # the log knows an estimator by its topic; what it stands for is known here
     use_gyro = getattr(run.node.values, "use_gyro", None)
     return figures | {
-        "estimator": run.node.name,
+        "estimator": ":".join(filter(None, (run.node.name, run.changed))),
         "gyro": "on" if use_gyro in (True, None) else "off",
         "flown": run.comparison is not None,
         "topic": next(topic for topic, _ in run.outputs.values()),

@@ -57,7 +57,8 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:
     """The table and the figures of the flight."""
-    console.print(summary_table(runs))
+    if runs:
+        console.print(summary_table(runs))
     console.print(
         f"{result.simulated_s:.1f} s simulated in {result.wall_s:.1f} s wall, {result.cpu_s:.1f} s CPU: "
         f"{result.realtime_factor:.0f} times real time"

@@ -2,18 +2,20 @@
 """What people type: estimator requests, missions, options; and what they get when it is wrong."""
 
 import json
+from pathlib import Path
 
 import pytest
 
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
 from css_bringup.flight import FlightResult, default_bag
-from css_bringup.options import USAGE
+from css_bringup.options import FAILED, USAGE
 from css_bringup.replay import parse_request
 from css_bringup.report import flight_object
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 
+ROOT = Path(__file__).parents[3]
 WITHOUT_ESTIMATOR = "css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"
 
 
@@ -36,7 +38,8 @@ def test_requests_of_another_form_are_refused(text):
     [
         (["no_such_mission"], "no_such_mission"),
         (["okeefe_2013", "--set", "cells.field_of_vew_deg=100"], "did you mean cells.field_of_view_deg?"),
-        (["okeefe_2013", "--set", "cells.field_of_view_deg=190"], "at most 180"),
+        (["okeefe_2013", "--set", "cells.field_of_view_deg=190"], "[deg], at least 1 and at most 180"),
+        (["[/red]"], "[/red]: no such mission file"),
         (["okeefe_2013", "--set", "spacecraft.inertia=1,0,0,0,1,0,0,0,9"], "triangle inequality"),
         (["okeefe_2013", "--set", "wheels.axes=1,0,0,0,1,0,0,1,0"], "span 2 of 3"),
         (["okeefe_2013", "--duration", "-5"], "above 0"),
@@ -66,6 +69,16 @@ def test_an_unwritable_folder_is_one_line(tmp_path, capfd):
     assert "Traceback" not in capfd.readouterr().err
 
 
+def test_unwritable_figures_are_one_line(tmp_path, capfd):
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    reference = str(ROOT / "bags" / "reference")
+    code = replay_command.main([reference, "--out", str(tmp_path / "bag"), "--figures", str(blocked / "figures")])
+    assert code == USAGE
+    printed = capfd.readouterr().err
+    assert "figures cannot be written" in printed and "Traceback" not in printed
+
+
 def test_recordings_never_share_a_folder(tmp_path):
     mission = default_mission()
     first = default_bag(mission, tmp_path)
@@ -83,6 +96,16 @@ def test_result_counts_what_the_cycles_must_have_produced(tmp_path):
     result.recorded = full | {"/css/voltages": 97}
     assert result.messages_lost == 3
     assert result.messages_recorded == 100 * len(full) - 3
+
+
+def test_a_recorder_that_died_is_what_a_failed_flight_reports(tmp_path, capfd):
+    (tmp_path / "flight_0.mcap").write_bytes(b"")
+    mission = load_mission("okeefe_2013")
+    result = FlightResult(mission, steps=100, bag=tmp_path, failure="recorder died (SIGKILL)")
+    assert fly.conclude(mission, result, as_json=True) == FAILED
+    printed = capfd.readouterr()
+    assert printed.err.splitlines() == ["the flight failed: recorder died (SIGKILL)"]
+    assert json.loads(printed.out.splitlines()[-1])["runs"] == []
 
 
 def test_json_result_has_the_documented_keys(tmp_path):

@@ -54,6 +54,10 @@ class PlantNode(ComponentNode):
         """True once all partners were there and the first messages are out."""
         return self._begun
 
+    def halt(self) -> None:
+        """Ends the flight at the stamp it has reached: partners may still answer it, no step follows."""
+        self.done = True
+
     def _configure(self) -> None:
         super()._configure()
         lockstep = self.component.values.lockstep
@@ -113,7 +117,7 @@ class PlantNode(ComponentNode):
     # Start
 
     def _try_to_begin(self) -> None:
-        if self._startup_timer is None:  # firings of the timer that were under way when it was destroyed
+        if self._startup_timer is None or self.done:  # firings of the timer that were under way when it was destroyed
             return
         absent = self._absent_partners()
         rivals = self._rivals()
@@ -258,12 +262,12 @@ class PlantNode(ComponentNode):
             self._held_back = outgoing
 
     def _on_pace(self) -> None:
-        if not self._is_active:
+        if not self._is_active or self.done:
             return
         if self._held_back is not None:
             outgoing, self._held_back = self._held_back, None
             self._go_to(self._stamp + self.component.period_ns, outgoing)
-        elif self._begun and not self.done:
+        elif self._begun:
             self.counters["deadline_missed"] += 1
 
     # Partners that fall silent

@@ -21,7 +21,7 @@ from css_estimation.snapshot import MODE_NO_SUN
 
 
 def wavg_parameters(**changes):
-    return wavg.parameters(default_values(CELLS + wavg.PARAMETERS, **changes))
+    return wavg.parameters(default_values(CELLS + wavg.PARAMETERS, **changes)).snapshot
 
 
 @kernel
@@ -39,7 +39,7 @@ def error_map(warp=False, scale=1.0, p=None):
     p = p or wavg_parameters()
     error = np.empty((POLAR.size, AZIMUTH.size))
     seen = np.zeros((POLAR.size, AZIMUTH.size), dtype=np.int64)
-    map_of_sphere(p.snapshot.layout, p.snapshot.gate, POLAR, AZIMUTH, warp, scale, np.empty(p.snapshot.layout.cells.size), error, seen)
+    map_of_sphere(p.layout, p.gate, POLAR, AZIMUTH, warp, scale, np.empty(p.layout.cells.size), error, seen)
     return np.degrees(error), seen
 
 
@@ -137,9 +137,9 @@ def test_bias_toward_the_pole_has_a_closed_form(theta, error):
     p = wavg_parameters()
     t = math.radians(theta)
     s = np.array([math.sin(t), 0.0, math.cos(t)])
-    normals = np.stack([p.snapshot.layout.cells[c] for c in ("nx", "ny", "nz")], axis=1)
+    normals = np.stack([p.layout.cells[c] for c in ("nx", "ny", "nz")], axis=1)
     voltages = np.where(normals[:, 2] > 0.0, np.maximum(normals @ s, 0.0), 0.0)
-    s_hat, mask, mode = wavg.weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, brightest(voltages))
+    s_hat, mask, mode = wavg.weighted_average(p.layout, p.gate, voltages, brightest(voltages))
     assert mask == 0b1111
     assert mode == wavg.MODE_AVERAGE
     assert math.degrees(math.atan2(s_hat[0], s_hat[2])) == pytest.approx(theta - error, abs=0.0005)
@@ -164,30 +164,30 @@ def test_albedo_light_below_the_gate_has_no_effect():
     direct = np.array([0.9, 0.6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     lit_by_earth = direct.copy()
     lit_by_earth[4:] = 0.4
-    clean = wavg.weighted_average(p.snapshot.layout, p.snapshot.gate, direct, 0)
-    assert wavg.weighted_average(p.snapshot.layout, p.snapshot.gate, lit_by_earth, 0) == clean
+    clean = wavg.weighted_average(p.layout, p.gate, direct, 0)
+    assert wavg.weighted_average(p.layout, p.gate, lit_by_earth, 0) == clean
 
 
 def test_modes():
     p = wavg_parameters()
     dark = np.zeros(8)
-    assert wavg.weighted_average(p.snapshot.layout, p.snapshot.gate, dark, brightest(dark)) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
+    assert wavg.weighted_average(p.layout, p.gate, dark, brightest(dark)) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
     single = dark.copy()
     single[3] = 0.6
-    s_hat, mask, mode = wavg.weighted_average(p.snapshot.layout, p.snapshot.gate, single, brightest(single))
+    s_hat, mask, mode = wavg.weighted_average(p.layout, p.gate, single, brightest(single))
     assert (mask, mode) == (1 << 3, wavg.MODE_SINGLE_CELL)
-    cell = p.snapshot.layout.cells[3]
+    cell = p.layout.cells[3]
     np.testing.assert_allclose(s_hat, (cell["nx"], cell["ny"], cell["nz"]), rtol=1e-15)
     absolute = wavg_parameters(gate_kind="absolute", gate=0.4)
     dim = 0.5 * single
-    assert wavg.weighted_average(absolute.snapshot.layout, absolute.snapshot.gate, dim, 3)[1:] == (1 << 3, wavg.MODE_BELOW_GATE)
-    assert wavg.weighted_average(absolute.snapshot.layout, absolute.snapshot.gate, 0.15 * single, 3)[2] == MODE_NO_SUN
+    assert wavg.weighted_average(absolute.layout, absolute.gate, dim, 3)[1:] == (1 << 3, wavg.MODE_BELOW_GATE)
+    assert wavg.weighted_average(absolute.layout, absolute.gate, 0.15 * single, 3)[2] == MODE_NO_SUN
 
 
 def test_normals_that_cancel_leave_no_direction():
     p = wavg_parameters(cells__normals=[1.0, 0.0, 0.0, -1.0, 0.0, 0.0], cells__clip_normal=[0.0, 0.0, 0.0])
     voltages = np.array([0.7, 0.7])
-    assert wavg.weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, 0) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
+    assert wavg.weighted_average(p.layout, p.gate, voltages, 0) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
 
 
 def test_layout_of_the_default_mission_is_the_dual_pyramid():

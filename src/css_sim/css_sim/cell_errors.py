@@ -20,6 +20,7 @@ PARAMETERS: Table = (
     real("fixed_degradation", 0.0, "-", "largest lasting loss of a cell, uniform", low=0.0, high=1.0),
     real("scale_common_error", 0.0, "-", "1 sigma of the scale error of all cells", low=0.0, high=1.0),
     real("scale_cell_error", 0.0, "-", "1 sigma of the scale error of each cell", low=0.0, high=1.0),
+    real("scale", 1.0, "-", "output of all cells, relative to what they are calibrated to", low=0.0, high=10.0),
     real("misalignment_deg", 0.0, "deg", "1 sigma of the tilt of each normal, per axis", low=0.0, high=45.0),
     real("bias", 0.0, "-", "1 sigma of the constant offset of each cell", low=0.0, high=1.0),
 )
@@ -35,6 +36,7 @@ class CellErrorModel(NamedTuple):
     fixed_degradation: float  # [-] uniform from 0 to this
     scale_common_error: float  # [-] 1 sigma
     scale_cell_error: float  # [-] 1 sigma
+    scale: float  # [-] of all cells, the same in every case
     misalignment: float  # [rad] 1 sigma about each of two axes across the normal
     bias: float  # [-] 1 sigma
 
@@ -45,6 +47,7 @@ def error_model(values: Values) -> CellErrorModel:
         fixed_degradation=values.fixed_degradation,
         scale_common_error=values.scale_common_error,
         scale_cell_error=values.scale_cell_error,
+        scale=values.scale,
         misalignment=math.radians(values.misalignment_deg),
         bias=values.bias,
     )
@@ -75,7 +78,7 @@ def tilted(normal_b: Vec3, a: float, b: float) -> Vec3:
 @kernel
 def draw_cells(p: CellErrorModel, key: RandomKey, nominal, cells_out) -> None:
     """Draw the cells of one case into `cells_out` from the `nominal` ones, both (N,) of CELL."""
-    common = 1.0 + p.scale_common_error * normal4(key, Stream.CELL_SCALE, 1, 0)[0]
+    common = p.scale * (1.0 + p.scale_common_error * normal4(key, Stream.CELL_SCALE, 1, 0)[0])
     for i in range(nominal.shape[0]):
         cell = nominal[i]
         u = uniform4(key, Stream.CELL_SCALE, 0, i)

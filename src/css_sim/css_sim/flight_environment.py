@@ -10,6 +10,7 @@ PARAMETERS: Table = (
 )
 
 
-def flight_environment(values: Values) -> MissionEnvironment:
-    """The environment that `PARAMETERS` and the mission's orbit describe."""
-    return MissionEnvironment(values, field=values.geomagnetic_field, conical_shadow=values.shadow == "conical")
+def flight_environment(values: Values, field: bool = True) -> MissionEnvironment:
+    """The environment that `PARAMETERS` and the mission's orbit describe; `field=False` when nobody needs the field."""
+    field = field and values.geomagnetic_field
+    return MissionEnvironment(values, field=field, conical_shadow=values.shadow == "conical")

@@ -109,6 +109,12 @@ def test_scale_errors_common_and_per_cell():
     assert uncorrelated(gain[:, 0], gain[:, 1])
 
 
+def test_a_wrong_calibration_scales_all_cells_of_every_case():
+    _, model, nominal = build(scale_common_error=0.1)
+    _, wrong, _ = build(scale_common_error=0.1, scale=0.8)
+    np.testing.assert_allclose(draws(wrong, nominal, 50)["gain"], 0.8 * draws(model, nominal, 50)["gain"])
+
+
 def test_lasting_degradation_and_bias():
     _, model, nominal = build(fixed_degradation=0.2, bias=0.03)
     drawn = draws(model, nominal, 5000)

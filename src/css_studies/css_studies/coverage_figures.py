@@ -11,7 +11,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.image import AxesImage
 
 from css_studies.coverage import CellMap, Grid
-from css_studies.figure_style import DARK_GREY, VERMILION, new_figure, save, style
+from css_studies.figure_style import DARK_GREY, VERMILION, new_figure, save, style, subtitle
 
 _SIZE = (8.0, 4.4)  # [inches]
 _HOLE = VERMILION
@@ -125,4 +125,4 @@ def _mark_cells(axes: Axes, cells: np.ndarray) -> None:
 
 def _name(axes: Axes, title: str, subject: str) -> None:
     axes.set_title(title)
-    axes.set_title(subject, loc="right", fontsize=8.0, fontweight="normal", color=DARK_GREY)
+    subtitle(axes, subject)

@@ -114,6 +114,18 @@ def level_line(axes: Axes, value: float, label: str) -> None:
     )
 
 
+def shade_dark(axes: Axes, time: np.ndarray, dark: np.ndarray) -> None:
+    """Grey background over the stretches of `dark`, both (T,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], dark.astype(np.int8), [0]))))
+    for first, end in edges.reshape(-1, 2):
+        axes.axvspan(time[first], time[end - 1], color=SHADE, linewidth=0.0, zorder=0)
+
+
+def subtitle(axes: Axes, text: str) -> None:
+    """A remark in small grey letters at the right end of the title."""
+    axes.set_title(text, loc="right", fontsize=8.0, fontweight="normal", color=DARK_GREY)
+
+
 def logarithmic(axes: Axes) -> None:
     """Logarithmic ordinate with plain numbers."""
     axes.set_yscale("log")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from matplotlib.axes import Axes
 
-from css_studies.figure_style import DARK_GREY, colours, new_figure, save, style
+from css_studies.figure_style import colours, new_figure, save, style, subtitle
 from css_studies.flight_log import FlightLog
 from css_studies.flight_panels import (
     Panel,
@@ -62,7 +62,7 @@ def _draw(log: FlightLog, panels: Sequence[Panel], path: Path) -> Path:
             panel.draw(axes, log, unit)
             axes.set_title(panel.title)
         _finish_time(all_axes, unit)
-        _annotate(all_axes[0], _subject(log))
+        subtitle(all_axes[0], _subject(log))
         figure.align_ylabels()
         return save(figure, path)
 
@@ -94,7 +94,7 @@ def _write_comparison(logs: Sequence[FlightLog], labels: Sequence[str], folder: 
         finish_pointing_error(pointing)
         finish_rate(rate)
         _finish_time(all_axes, unit)
-        _annotate(heading, _subject(longest))
+        subtitle(heading, _subject(longest))
         figure.align_ylabels()
         return [save(figure, folder / "comparison.png")]
 
@@ -104,10 +104,6 @@ def _finish_time(all_axes: Iterable[Axes], unit: TimeAxis) -> None:
     if unit.last > unit.first:
         last.set_xlim(unit.first, unit.last)
     last.set_xlabel(unit.label)
-
-
-def _annotate(axes: Axes, text: str) -> None:
-    axes.set_title(text, loc="right", fontsize=8.0, fontweight="normal", color=DARK_GREY)
 
 
 def _subject(log: FlightLog) -> str:

@@ -28,7 +28,6 @@ from css_msgs.msg import (
     WheelState,
     WheelTorqueCommand,
 )
-from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
 from css_studies.message_columns import Columns, stack
 
@@ -223,6 +222,8 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
     Raises:
         BagError: it cannot be read, holds a damaged message, or none of the types that a flight is made of.
     """
+    from css_recording.bag_reader import BagReader  # a quarter of a second that studies without bags need not pay
+
     with BagReader(path, remap) as reader:
         mission, notes = None, []
         text = reader.mission_text

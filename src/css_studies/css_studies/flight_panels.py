@@ -12,13 +12,13 @@ from css_studies.estimate_errors import heading_errors
 from css_studies.figure_style import (
     BLACK,
     BLUE,
-    SHADE,
     Colour,
     colours,
     draw_series,
     legend,
     level_line,
     logarithmic,
+    shade_dark,
 )
 from css_studies.flight_log import FlightLog
 from css_studies.message_columns import Columns
@@ -61,10 +61,7 @@ def shade_eclipse(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
         dark = columns.eclipse == SunEstimate.ECLIPSE_ECLIPSED
     else:
         return
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], dark.astype(np.int8), [0]))))
-    time = log.time(columns) / unit.scale
-    for first, end in edges.reshape(-1, 2):
-        axes.axvspan(time[first], time[end - 1], color=SHADE, linewidth=0.0, zorder=0)
+    shade_dark(axes, log.time(columns) / unit.scale, dark)
 
 
 def draw_heading_error(

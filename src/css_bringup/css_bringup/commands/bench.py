@@ -16,14 +16,13 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from css_bringup import monte_carlo_bench
 from css_bringup.flight import FlightResult
 from css_bringup.flying import fly
 from css_bringup.json_process import MeasurementError
-from css_bringup.options import FAILED, console, errors, guarded, whole_number
+from css_bringup.options import FAILED, complain, console, guarded, whole_number
 from css_bringup.report import print_json
 from css_common.mission import Mission, load_mission
 
@@ -65,7 +64,7 @@ def _bench_monte_carlo(arguments: argparse.Namespace) -> int:
     try:
         monte_carlo_bench.run(arguments)
     except MeasurementError as error:
-        errors.print(f"[red]error:[/red] {escape(str(error))}", soft_wrap=True)
+        complain("error:", error)
         return FAILED
     return 0
 
@@ -80,7 +79,7 @@ def _bench_graph(arguments: argparse.Namespace) -> int:
         for name, (processes, recorded) in _CONFIGURATIONS.items():
             result = _fly_once(mission, processes=processes, recorded=recorded)
             if result.failure or result.interrupted:
-                errors.print(f"[red]{name}: the flight failed:[/red] {result.failure or 'interrupted'}")
+                complain(f"{name}: the flight failed:", result.failure or "interrupted")
                 return FAILED
             measured[name].append(result)
     figures = {name: _figures(results) for name, results in measured.items()}

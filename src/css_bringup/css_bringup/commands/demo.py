@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 
 from css_bringup.commands.replay import print_replay
+from css_bringup.figures import print_figures
 from css_bringup.flight import default_bag
 from css_bringup.flying import fly
 from css_bringup.options import (
@@ -18,6 +19,7 @@ from css_bringup.options import (
     INTERRUPTED,
     add_mission_options,
     add_output_options,
+    complain,
     console,
     errors,
     guarded,
@@ -26,7 +28,6 @@ from css_bringup.options import (
 from css_bringup.replay import parse_request
 from css_bringup.replaying import replay
 from css_bringup.report import flight_object, print_json, print_result, unmet
-from css_studies.flight_figures import write_figures
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
 
@@ -62,7 +63,7 @@ def _run(arguments: argparse.Namespace) -> int:
         errors.print(f"interrupted; the recording up to here is complete: {bag}", soft_wrap=True)
         return INTERRUPTED
     if flight.failure:
-        errors.print(f"[red]the flight failed:[/red] {flight.failure}", soft_wrap=True)
+        complain("the flight failed:", flight.failure)
         return FAILED
     log = read_flight(bag)
     flown = estimator_runs(log, [mission.values.graph.estimator])
@@ -71,14 +72,14 @@ def _run(arguments: argparse.Namespace) -> int:
     replayed = replay(bag, bag.with_name(f"{bag.name}_replay"), mission, map(parse_request, _REPLAYED), {})
     print_replay(replayed)
     folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
-    for file in (*write_figures(log, folder), *write_figures(replayed.log, folder / "replay")):
-        console.print(f"figure: {file}", soft_wrap=True)
+    print_figures(log, folder)
+    print_figures(replayed.log, folder / "replay")
     runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
     if arguments.json:
         print_json(flight_object(flight, runs))
     missed = unmet(flight, flown)
     for line in missed:
-        errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
+        complain("criterion missed:", line)
     return FAILED if missed else 0
 
 

@@ -11,6 +11,7 @@ from css_bringup.options import (
     INTERRUPTED,
     add_mission_options,
     add_output_options,
+    complain,
     console,
     errors,
     guarded,
@@ -18,8 +19,9 @@ from css_bringup.options import (
 )
 from css_bringup.report import flight_object, print_json, print_result, unmet
 from css_common.mission import Mission
+from css_recording.errors import BagError
 from css_studies.flight_log import read_flight
-from css_studies.flight_metrics import estimator_runs
+from css_studies.flight_metrics import Run, estimator_runs
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -52,15 +54,20 @@ def _run(arguments: argparse.Namespace) -> int:
 
 def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     """Prints a flight's result and turns it into an exit code."""
-    runs = []
+    runs: list[Run] = []
     if result.bag is not None and result.steps > 0:
-        runs = estimator_runs(read_flight(result.bag))
+        try:
+            runs = estimator_runs(read_flight(result.bag))
+        except BagError as error:
+            # a recorder that died leaves such a recording, and why it died is the better news
+            result.failure = result.failure or str(error)
     print_result(console, result, runs)
     if result.failure:
-        errors.print(f"[red]the flight failed:[/red] {result.failure}", soft_wrap=True)
-    missed = unmet(result, runs) if result.bag is not None else []
+        complain("the flight failed:", result.failure)
+    flown = not (result.failure or result.interrupted)
+    missed = unmet(result, runs) if flown and result.bag is not None else []
     for line in missed:
-        errors.print(f"[red]criterion missed:[/red] {line}", soft_wrap=True)
+        complain("criterion missed:", line)
     if as_json:
         print_json(flight_object(result, runs))
     if result.interrupted:

@@ -10,12 +10,12 @@ import argparse
 import sys
 from pathlib import Path
 
-from css_bringup.options import FAILED, console, errors, guarded
+from css_bringup.figures import print_figures
+from css_bringup.options import FAILED, complain, console, guarded
 from css_bringup.replay import parse_request
 from css_bringup.replaying import ReplayResult, mission_of_bag, replay
 from css_bringup.report import print_json
 from css_common.mission_file import MissionError
-from css_studies.flight_figures import write_figures
 from css_studies.flight_summary import summary_table
 
 
@@ -58,13 +58,12 @@ def _run(arguments: argparse.Namespace) -> int:
     )
     print_replay(result)
     if arguments.figures:
-        for file in write_figures(result.log, arguments.figures):
-            console.print(f"figure: {file}", soft_wrap=True)
+        print_figures(result.log, arguments.figures)
     if arguments.json:
         print_json(result.result_object())
     silent = [run.label for run in result.replayed if run.messages == 0]
     if silent:
-        errors.print(f"[red]no estimate from {', '.join(silent)}:[/red] their inputs never met in one stamp")
+        complain(f"no estimate from {', '.join(silent)}:", "their inputs never met in one stamp")
         return FAILED
     return 0
 

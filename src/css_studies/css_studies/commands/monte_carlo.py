@@ -18,12 +18,13 @@ from pathlib import Path
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+from rich.text import Text
 
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
+from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.schedulers import DaskScheduler
 from css_studies.monte_carlo.study_summary import study_object
 
@@ -95,7 +96,7 @@ def _run(options: argparse.Namespace) -> int:
     folder = options.out or _default_folder(mission.name)
     messages = Console(stderr=True, highlight=False)
     begin = time.perf_counter()
-    with _progress_bar(messages) as bar:
+    with progress_bar(messages) as bar:
         task = bar.add_task(mission.name, total=None)
         study = run_study(
             mission,
@@ -153,44 +154,30 @@ def _default_folder(mission: str) -> Path:
     return home / "studies" / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
 
 
-def _progress_bar(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TextColumn("cases"),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-        console=console,
-        disable=not console.is_terminal,
-    )
-
-
 _COLUMNS = (
-    ("heading_error_mean_deg", "heading\nmean\n[deg]", "{:.2f}"),
-    ("heading_error_p95_deg", "heading\n95 %\n[deg]", "{:.2f}"),
-    ("power_positive_fraction", "power\npositive\n[%]", "{:.1%}"),
-    ("converging_mean_s", "con-\nverging\nmean [s]", "{:.1f}"),
-    ("converging_max_s", "con-\nverging\nmax [s]", "{:.1f}"),
-    ("rate_50min_deg_s", "rate\n50 min\n[deg/s]", "{:.3f}"),
-    ("rate_knowledge_50min_deg_s", "rate error\n50 min\n[deg/s]", "{:.3f}"),
+    ("heading_error_mean_deg", "heading\nerror\nmean\n[deg]", "{:.2f}"),
+    ("heading_error_p95_deg", "heading\nerror\n95 %\n[deg]", "{:.2f}"),
+    ("power_positive_fraction", "power\nposi-\ntive\n", "{:.1%}"),
+    ("converging_mean_s", "con-\nverging\nmean\n[s]", "{:.1f}"),
+    ("converging_max_s", "con-\nverging\nmax\n[s]", "{:.1f}"),
+    ("rate_50min_deg_s", "rate at\n50 min\n\n[deg/s]", "{:.3f}"),
+    ("rate_knowledge_50min_deg_s", "its\nerror\n\n[deg/s]", "{:.3f}"),
 )
 
 
 def print_study(study: Study, result: dict, console: Console) -> None:
-    """The table of a study and where its files are."""
-    table = Table(box=box.SIMPLE_HEAD)
-    swept = any(row["overrides"] for row in result["configurations"])
-    for name in ("estimator", "gyro", *(["swept"] if swept else [])):
-        table.add_column(name, vertical="bottom")
-    for _, title, _ in _COLUMNS:
-        table.add_column(title, justify="right", vertical="bottom")
-    for row in result["configurations"]:
-        named = [row["estimator"], row["gyro"], *([" ".join(row["overrides"])] if swept else [])]
-        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
-        table.add_row(*named, *figures)
-    console.print(table)
+    """A table for each point of the sweeps, and where the files are."""
+    for point, rows in itertools.groupby(result["configurations"], key=lambda row: row["overrides"]):
+        title = " ".join(point) or None
+        table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title=title, title_justify="left")
+        for name in ("estimator", "gyro"):
+            table.add_column(name, vertical="bottom")
+        for _, heading, _ in _COLUMNS:
+            table.add_column(Text(heading), justify="right", vertical="bottom")
+        for row in rows:
+            figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+            table.add_row(row["estimator"], row["gyro"], *figures)
+        console.print(table)
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "

@@ -8,7 +8,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, angle_between, norm, subtract
-from css_estimation.sun_heading import RATE_NONE, VALIDITY_NONE, SunHeading
+from css_estimation.sun_heading import VALIDITY_NONE, SunHeading
 from css_studies.estimate_errors import tangent_nees_of
 from css_studies.flight_log import SUNLIT_FRACTION
 from css_studies.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITIVE
@@ -45,7 +45,6 @@ TALLY = np.dtype(
             "pointings",
             "late",
             "reported",
-            "reported_rates",
             "final",
             "without_estimate",
             "innovations",
@@ -162,9 +161,7 @@ def tally_step(
         if (marks & REPORTED) != 0:
             t.reported += 1
             t.reported_sum += rate
-            if heading.rate_source != RATE_NONE:
-                t.reported_rates += 1
-                t.reported_knowledge_sum += _DEG * norm(subtract(heading.omega_bn_b, omega_bn_b))
+            t.reported_knowledge_sum += _DEG * norm(subtract(heading.omega_bn_b, omega_bn_b))
         if (marks & FINAL) != 0:
             t.final += 1
             t.final_sum += rate
@@ -226,8 +223,8 @@ def _tally_sample(tallies, c, step, pointing, error, sun_b, omega_bn_b, heading)
     samples[c, 0, at] = error
     samples[c, 1, at] = pointing
     samples[c, 2, at] = _DEG * norm(omega_bn_b)
-    if heading.rate_source != RATE_NONE:
-        samples[c, 3, at] = _DEG * norm(subtract(heading.omega_bn_b, omega_bn_b))
+    # also where the estimator holds an old rate for want of a new one: what it says is what control and user get
+    samples[c, 3, at] = _DEG * norm(subtract(heading.omega_bn_b, omega_bn_b))
     if heading.covariance[0] >= 0.0 and not math.isnan(error):
         t.consistencies += 1
         t.nees_sum += tangent_nees_of(heading.sun_b, heading.covariance, sun_b)

@@ -46,7 +46,7 @@ def case_table(numbers: np.ndarray, tallies: Tallies, period_s: float) -> pa.Tab
         "pointing_error_mean_deg": _ratio(t["pointing_sum"], t["pointings"]),
         "rate_final_deg_s": _ratio(t["final_sum"], t["final"]),
         "rate_50min_deg_s": _ratio(t["reported_sum"], t["reported"]),
-        "rate_knowledge_50min_deg_s": _ratio(t["reported_knowledge_sum"], t["reported_rates"]),
+        "rate_knowledge_50min_deg_s": _ratio(t["reported_knowledge_sum"], t["reported"]),
         "wheel_momentum_max": t["momentum_max"],
         "wheel_momentum_final": t["momentum"],
         "nees_mean": _ratio(t["nees_sum"], 2 * t["consistencies"]),

@@ -40,9 +40,10 @@ def flown_task(task: ChunkTask) -> tuple[np.ndarray, float, Flown]:
     return numbers, flight.mission.period_ns * 1e-9, fly_cases(flight, numbers, task.sample_every)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)
 def _flight_of(mission_text: str, origin: str) -> MissionFlight:
-    # tables of the environment are worth keeping from chunk to chunk
+    # Tables of the environment, 1 kB a step, are worth keeping from chunk to chunk. Chunks come sorted by mission, so
+    # that threads work on one or two.
     return MissionFlight(mission_from_text(mission_text, origin))
 
 

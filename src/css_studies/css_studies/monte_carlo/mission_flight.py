@@ -84,7 +84,9 @@ class MissionFlight:
         common = None
         if self._grid is not None:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
-        self.surroundings = SurroundingsTables(self._plant.values, self._estimator.values, common, self._own_earth)
+        self.surroundings = SurroundingsTables(
+            self._plant.values, self._estimator.values, common, self._own_earth, self._feels_field()
+        )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
         self.marks = step_marks(illumination, mission.period_ns * 1e-9)
 
@@ -171,6 +173,10 @@ class MissionFlight:
             substeps=plant.substeps,
             array_normal_b=(x, y, z),
         )
+
+    def _feels_field(self) -> bool:
+        plant = self._plant.values
+        return self._magnetometer is not None or plant.rods.fitted or bool(np.any(plant.disturbances.dipole))
 
     def _faults(self, array: Values, numbers: np.ndarray) -> np.ndarray:
         return np.stack([cell_faults.case_faults(array, self._key(int(number))) for number in numbers])

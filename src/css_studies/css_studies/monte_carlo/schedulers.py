@@ -68,34 +68,44 @@ class DaskScheduler(Scheduler):
 
     Args:
         address: of the cluster's scheduler, or `local` for a cluster on this machine.
+        workers: of a local cluster; None: one per processor.
+        timeout_s: how long to wait for the scheduler [s].
 
     Raises:
         StudyError: dask is not installed, or nothing answers there.
     """
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, workers: int | None = None, timeout_s: float = 10.0) -> None:
         try:
             from distributed import Client, LocalCluster
         except ImportError as error:
-            raise StudyError("--scheduler needs dask.distributed: pip install 'distributed'") from error
+            raise StudyError(
+                "--scheduler needs dask.distributed, the extra `cluster`: "
+                "./sunpoint shell -c 'uv pip install -r requirements-cluster.lock'"
+            ) from error
         self._cluster: Any = None
         try:
             if address == "local":
-                self._cluster = LocalCluster(threads_per_worker=1, dashboard_address=None)
-            self._client = Client(self._cluster or address, timeout="10s")
+                workers = workers or len(os.sched_getaffinity(0))
+                self._cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
+            self._client = Client(self._cluster or address, timeout=timeout_s)
         except (OSError, ValueError) as error:
-            raise StudyError(f"--scheduler {address}: no dask scheduler answers there: {error}") from error
+            raise StudyError(f"--scheduler {address}: no dask scheduler answers there") from error
 
     def __exit__(self, *_: object) -> None:
         self._client.close()
         if self._cluster is not None:
             self._cluster.close()
 
+    def worker_processes(self) -> list[int]:
+        """Process numbers of the workers, on their own machines."""
+        return list(self._client.run(os.getpid).values())
+
     def run(self, tasks: Mapping[str, ChunkTask]) -> Iterator[tuple[str, ChunkResult]]:
         """Results by name, in the order in which they come."""
         from distributed import as_completed as arriving
 
-        # pure=False: equal tasks of two studies are not to share a fate
+        # pure=False: equal tasks of two studies do not share a fate
         futures = {self._client.submit(run_task, task, pure=False, retries=3): name for name, task in tasks.items()}
         for future, result in arriving(futures, with_results=True):
             yield futures.pop(future), result

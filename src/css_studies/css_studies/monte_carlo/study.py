@@ -40,7 +40,8 @@ class Configuration(NamedTuple):
         Raises:
             MissionError: there is no such estimator or key.
         """
-        return configured(mission.with_overrides(self.overrides), estimator=self.estimator, gyro=self.gyro)
+        # the estimator first: only then does the mission know its keys
+        return configured(mission, estimator=self.estimator, gyro=self.gyro).with_overrides(self.overrides)
 
     @property
     def columns(self) -> dict[str, Any]:

@@ -107,12 +107,18 @@ class SurroundingsTables:
         estimator: values of the estimator that flies (its eclipse prediction).
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
+        field: something feels the geomagnetic field.
     """
 
     def __init__(
-        self, plant: Values, estimator: Values, reflectivity: np.ndarray | None, own_earth: bool = False
+        self,
+        plant: Values,
+        estimator: Values,
+        reflectivity: np.ndarray | None,
+        own_earth: bool = False,
+        field: bool = True,
     ) -> None:
-        self._environment: MissionEnvironment = flight_environment(plant)
+        self._environment: MissionEnvironment = flight_environment(plant, field)
         self._prediction = None if estimator.eclipse.source == "sensors" else EclipsePrediction(estimator)
         self._period_ns = round(plant.mission.period * 1e9)
         self._epoch_ns = parse_utc(plant.mission.epoch)

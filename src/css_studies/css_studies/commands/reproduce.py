@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies a paper's experiments again: its figures, and its numbers beside ours, as a page."""
+
+import argparse
+import json
+import os
+import signal
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from css_common.mission_file import MissionError
+from css_studies.monte_carlo import StudyError
+from css_studies.monte_carlo.progress import progress_bar
+from css_studies.monte_carlo.study import Progress
+from css_studies.reproduce.papers import Paper, ReproductionError, Request, find_paper, paper_names
+from css_studies.reproduce.rows import Row, number, printed, row_object
+
+USAGE, INTERRUPTED = 2, 130
+CASES, QUICK_CASES = 1000, 40
+_EPILOG = "Exit code: 0 done, also when numbers miss, 2 an argument or the folder is wrong, 130 interrupted."
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="reproduce", description=__doc__, epilog=_EPILOG)
+    parser.add_argument("paper", metavar="PAPER", help=f"one of: {', '.join(paper_names())}")
+    parser.add_argument(
+        "--cases", type=int, metavar="N", help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES})"
+    )
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the page (default: reports/PAPER)")
+    parser.add_argument("--quick", action="store_true", help="a first look: few cases, no side studies")
+    parser.add_argument("--json", action="store_true", help="print the numbers as one JSON object on the last line")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    # a killed terminal or `kill` end it as Ctrl-C does: finished flights stay
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        return _run(options)
+    except (ReproductionError, MissionError, StudyError, OSError) as error:
+        print(f"reproduce: {error}", file=sys.stderr)
+        return USAGE
+    except KeyboardInterrupt:
+        print("reproduce: interrupted; the same command goes on from here", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _run(options: argparse.Namespace) -> int:
+    paper = find_paper(options.paper)
+    cases = (QUICK_CASES if options.quick else CASES) if options.cases is None else options.cases
+    if not 1 <= cases <= 2**32:
+        raise ReproductionError(f"--cases: {cases} given, expected 1 to {2**32}")
+    folder = options.out or Path(os.environ.get("SUNPOINT_HOME", "."), "reports", paper.name)
+    folder.mkdir(parents=True, exist_ok=True)
+    with progress_bar(Console(stderr=True)) as bar:
+
+        def progress(name: str) -> Progress:
+            task = bar.add_task(name, total=None)
+            return lambda done, total: bar.update(task, completed=done, total=total)
+
+        rows = paper.reproduce(Request(folder, cases, options.quick, progress))
+    console = Console(highlight=False)
+    _print_table(paper, rows, console)
+    console.print(f"page: {folder / 'index.html'}", soft_wrap=True)
+    if options.json:
+        print(json.dumps({"paper": paper.name, "rows": [row_object(row) for row in rows]}, allow_nan=False))
+    return 0
+
+
+def _print_table(paper: Paper, rows: Sequence[Row], console: Console) -> None:
+    variants = list(dict.fromkeys(row.variant for row in rows))
+    # without a frame around the columns it fits into 80, which is what a console has that is no terminal
+    table = Table(title=paper.title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+    table.add_column("quantity", no_wrap=True)
+    for text in ("paper", *(variant or "here" for variant in variants)):
+        table.add_column(Text(text), justify="right", no_wrap=True)
+    for quantity, unit in dict.fromkeys((row.quantity, row.unit) for row in rows):
+        same = {row.variant: row for row in rows if row.quantity == quantity}
+        results = [_result(same.get(variant)) for variant in variants]
+        table.add_row(Text(f"{quantity} [{unit}]"), Text(printed(next(iter(same.values())))), *results)
+    console.print(table)
+    for row in rows:
+        if not row.ok:
+            quantity = row_object(row)["quantity"]
+            console.print(f"misses: {quantity}, {number(row.here)} {row.unit}, must be {row.must}", soft_wrap=True)
+
+
+def _result(row: Row | None) -> Text:
+    if row is None:
+        return Text("")
+    return Text(number(row.here), style="" if row.ok else "bold red")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures of merit of one configuration out of the tables of a study."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from css_studies.monte_carlo import Configuration
+
+_MINUTE = 60.0
+
+
+class Curve(NamedTuple):
+    """A quantity of all cases against time."""
+
+    time_s: np.ndarray  # (T,) since the epoch
+    mean: np.ndarray  # (T,) over the cases; NaN: no case has it
+    p95: np.ndarray  # (T,) 95th percentile
+
+
+class Merit(NamedTuple):
+    """What the cases of a configuration achieved; None: it cannot be said."""
+
+    cases: int
+    heading_error_late_deg: float | None  # mean over the cases, at the end of the flight
+    heading_error_deg: float | None  # mean over the cases, after acquisition
+    pointing_error_deg: float | None  # likewise, of array normal to true Sun
+    rate_50min_deg_s: float | None
+    converging_mean_min: float | None
+    converging_max_min: float | None  # None also when a case never converged
+    converging_first_max_min: float | None  # first pass through sunlight
+    converging_later_max_min: float | None  # after eclipse
+    converged_percent: float | None
+    acquired_mean_min: float | None  # since the epoch, over the cases that acquired
+    acquired_p95_min: float | None
+
+
+def column(cases: pa.Table, configuration: Configuration, name: str) -> np.ndarray:
+    """(C,) float64 values of a column of a study's `cases` for one configuration; NaN: null."""
+    values = _rows(cases, configuration).column(name).to_numpy()
+    return np.asarray(values, dtype=np.float64)
+
+
+def curve(percentiles: pa.Table, configuration: Configuration, quantity: str) -> Curve:
+    """A quantity of a study's `percentiles` for one configuration."""
+    table = _rows(percentiles, configuration)
+    table = table.filter(pc.equal(table.column("quantity"), quantity)).sort_by("time_s")
+    return Curve(*(np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in ("time_s", "mean", "p95")))
+
+
+def rate_error_before(percentiles: pa.Table, configuration: Configuration, time_s: float) -> tuple[float, float] | None:
+    """Mean error of the estimated rate [deg/s] in the last minute up to a time in which there is one, and its end [s].
+
+    Without gyro and light no rate is measured.
+    """
+    line = curve(percentiles, configuration, "rate_knowledge_deg_s")
+    known = np.flatnonzero(np.isfinite(line.mean) & (line.time_s <= time_s))
+    if not len(known):
+        return None
+    end_s = float(line.time_s[known[-1]])
+    last = known[line.time_s[known] > end_s - _MINUTE]
+    return float(line.mean[last].mean()), end_s
+
+
+def merit(cases: pa.Table, configuration: Configuration) -> Merit:
+    """Figures of merit of one configuration."""
+
+    def of(name: str) -> np.ndarray:
+        return column(cases, configuration, name)
+
+    converging = of("converging_s") / _MINUTE
+    acquired = of("acquired_s") / _MINUTE
+    return Merit(
+        cases=len(converging),
+        heading_error_late_deg=_mean(of("heading_error_late_deg")),
+        heading_error_deg=_mean(of("heading_error_mean_deg")),
+        pointing_error_deg=_mean(of("pointing_error_mean_deg")),
+        rate_50min_deg_s=_mean(of("rate_50min_deg_s")),
+        converging_mean_min=_mean(converging),
+        converging_max_min=_longest(converging),
+        converging_first_max_min=_longest(of("converging_first_s") / _MINUTE),
+        converging_later_max_min=_longest(of("converging_later_s") / _MINUTE),
+        converged_percent=100.0 * float(np.mean(np.isfinite(converging))) if len(converging) else None,
+        acquired_mean_min=_mean(acquired),
+        acquired_p95_min=float(np.nanpercentile(acquired, 95.0)) if np.isfinite(acquired).any() else None,
+    )
+
+
+def _rows(table: pa.Table, configuration: Configuration) -> pa.Table:
+    same = pc.and_(
+        pc.and_(
+            pc.equal(table.column("estimator"), configuration.estimator),
+            pc.equal(table.column("gyro"), configuration.gyro),
+        ),
+        pc.equal(table.column("overrides"), " ".join(configuration.overrides)),
+    )
+    return table.filter(same)
+
+
+def _mean(values: np.ndarray) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else None
+
+
+def _longest(values: np.ndarray) -> float | None:
+    longest = float(np.max(values, initial=-math.inf))
+    return longest if math.isfinite(longest) else None

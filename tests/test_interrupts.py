@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A flight that is asked to end: it stops at its stamp, nothing is lost or left running, however often one asks."""
+
+import os
+import signal
+
+from flights import messages_by_topic, short_mission
+
+from css_bringup.composed import ComposedFlight
+from css_bringup.processes import fly_processes
+from css_recording.process import StopSignal
+
+
+def _interrupt() -> None:
+    for _ in range(3):
+        os.kill(os.getpid(), signal.SIGINT)
+
+
+def test_a_composed_flight_stops_where_it_is(tmp_path):
+    mission = short_mission(5000.0)
+
+    def interrupt(seconds: float) -> None:
+        if seconds > 5.0:
+            _interrupt()
+
+    with StopSignal() as stop, ComposedFlight(mission, tmp_path / "bag") as flight:
+        result = flight.fly(interrupt, lambda: stop.came)
+    assert result.interrupted
+    assert not result.failure
+    assert 50 < result.steps < mission.steps
+    recorded = messages_by_topic(tmp_path / "bag")
+    assert {topic: len(recorded[f"/{topic}"]) for topic in mission.topics} == dict.fromkeys(
+        mission.topics, result.steps
+    )
+
+
+def test_processes_end_with_their_flight(tmp_path):
+    bag = tmp_path / "bag"
+    supervisors = []
+
+    def interrupt(supervisor) -> None:
+        if any(file.stat().st_size > 50_000 for file in bag.glob("*.mcap")):
+            supervisors.append(supervisor)
+            _interrupt()
+
+    with StopSignal() as stop:
+        result = fly_processes(short_mission(5000.0), bag, tmp_path / "logs", interrupt, lambda: stop.came)
+    assert result.interrupted
+    assert not result.failure
+    (supervisor,) = supervisors
+    codes = [child.poll() for child in (*supervisor.children.values(), supervisor.recorder)]
+    assert None not in codes
+    # the interrupt ended none of them unhandled
+    assert -signal.SIGINT not in codes
+    assert messages_by_topic(bag)["/truth"]
+
+
+def test_signals_mean_afterwards_what_they_meant_before():
+    before = signal.getsignal(signal.SIGINT)
+    with StopSignal() as stop:
+        _interrupt()
+    assert stop.came
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_flight_that_cannot_be_recorded_any_more_ends(tmp_path):
+    mission = short_mission(5000.0)
+    with ComposedFlight(mission, tmp_path / "bag") as flight:
+
+        def fill_disk(seconds: float) -> None:
+            flight.recorder.failure = "No space left on device"
+
+        result = flight.fly(fill_disk)
+    assert result.failure == "the flight is not recorded any more: No space left on device"
+    assert not result.interrupted
+    assert result.steps < mission.steps
