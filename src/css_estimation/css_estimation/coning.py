@@ -5,6 +5,7 @@ A candidate is chosen, in this order: because it is the only one; because it imp
 that is given; because its torque-free motion explains the pulses and no other's does; by power, which is no proof.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -131,11 +132,17 @@ def justification(coning: Coning) -> str:
     others = [r for i, r in enumerate(coning.residuals) if i != coning.chosen and r >= 0.0]
     fitted = ""
     if residual >= 0.0 and others:
-        fitted = f"; its motion misses the pulses by {1e6 * residual:.3g} us, the others' by {1e6 * min(others):.3g} us or more"
+        fitted = (
+            f"; its motion misses the pulses by {1e6 * residual:.3g} us, "
+            f"the others' by {1e6 * min(others):.3g} us or more"
+        )
     if coning.choice == CHOICE_ONLY:
         return f"the only frequency that a rigid body can have{fitted}"
     if coning.choice == CHOICE_INERTIA:
-        return f"implies a ratio of moments of inertia of {chosen.inertia_ratio:.3f}, nearest to the given one (all: {ratios}){fitted}"
+        return (
+            f"implies a ratio of moments of inertia of {chosen.inertia_ratio:.3f}, nearest to the given one "
+            f"(all: {ratios}){fitted}"
+        )
     if coning.choice == CHOICE_EVENTS:
         return f"its torque-free motion explains the pulses{fitted}"
     powers = ", ".join(f"{c.power:.4f}" for c in coning.candidates)
@@ -170,10 +177,10 @@ def _mean_motion(
     edges = np.linspace(start, np.nextafter(end, np.inf), max(1, round((end - start) / SEGMENT)) + 1)
     fits = [
         _motion(passages.between(a, b), inclination, candidate, spin, full_angle)
-        for a, b in zip(edges[:-1], edges[1:], strict=True)
+        for a, b in pairwise(edges)
     ]
     rows = np.array([fit for fit in fits if fit is not None])
     if not len(rows):
         return None
-    *means, _ = np.mean(rows, axis=0).tolist()
-    return MotionFit(*means, residual=float(np.sqrt(np.mean(rows[:, -1] ** 2))))
+    half_angle, coning, turns, sun_polar, _ = np.mean(rows, axis=0).tolist()
+    return MotionFit(half_angle, coning, turns, sun_polar, float(np.sqrt(np.mean(rows[:, -1] ** 2))))

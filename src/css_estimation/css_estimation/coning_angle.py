@@ -52,4 +52,5 @@ def fit_sine(time: np.ndarray, angle: np.ndarray, frequency: float) -> Sine:
     phase = 2.0 * np.pi * frequency * elapsed
     columns = np.stack((np.ones_like(elapsed), elapsed, np.cos(phase), np.sin(phase)), 1)
     solution, *_ = np.linalg.lstsq(columns, angle, rcond=None)
-    return Sine(*solution.tolist(), frequency)
+    offset, slope, cosine, sine = solution.tolist()
+    return Sine(offset, slope, cosine, sine, frequency)

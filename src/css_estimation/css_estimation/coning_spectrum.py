@@ -89,9 +89,9 @@ def lomb_scargle(time: np.ndarray, angle: np.ndarray, frequency: np.ndarray) -> 
 
 def alias_frequencies(base: float, rate: float, highest: float) -> list[float]:
     """All |k rate +- base| [Hz] above zero and up to `highest`, the lowest first."""
-    found = {round(base, 12)}
+    found = {round(float(base), 12)}
     for k in range(1, int(np.ceil((highest + base) / rate)) + 1):
-        found |= {round(abs(k * rate - base), 12), round(k * rate + base, 12)}
+        found |= {round(float(abs(k * rate - base)), 12), round(float(k * rate + base), 12)}
     return sorted(f for f in found if LEAST_FREQUENCY <= f <= highest)
 
 

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Counts of a timer of 32 bits as counts of one that never begins anew."""
 
-_SPAN = 2**32
+SPAN = 2**32
+"""Counts after which the timer begins anew."""
+
 _HALF = 2**31
 
 
@@ -16,5 +18,5 @@ class UnwrappedTimer:
         if self._last is None:
             self._last = count
         else:
-            self._last += (count - self._last + _HALF) % _SPAN - _HALF
+            self._last += (count - self._last + _HALF) % SPAN - _HALF
         return self._last

@@ -36,7 +36,7 @@ def interpolated_field(f0: Vec3, f1: Vec3, f2: Vec3, f3: Vec3, u: float) -> Vec3
 
 @kernel
 def interpolation_weights(u: float) -> tuple[float, float, float, float]:
-    """Weights of four equidistant samples for the cubic through them, at a fraction `u` from the second to the third."""
+    """Weights of four equidistant samples for the cubic through them, `u` of the way from the second to the third."""
     return (
         -u * (u - 1.0) * (u - 2.0) / 6.0,
         (u + 1.0) * (u - 1.0) * (u - 2.0) / 2.0,
