@@ -26,12 +26,12 @@ def write_rate_figure(passages: Passages, path: Path, events: Sequence[Event] = 
         below.plot(passages.time, np.degrees(passages.angle), ".", color=BLUE, markersize=1.5)
         below.set_ylabel("Sun angle [deg]")
         below.set_xlabel("time [s]")
-        for time, name in events:
+        for i, (time, name) in enumerate(events):
             for axes in (above, below):
                 axes.axvline(time, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
             above.annotate(
                 name,
-                (time, 1.0),
+                (time, 1.0 - 0.3 * (i % 3)),  # deployments follow each other closely
                 xycoords=("data", "axes fraction"),
                 xytext=(2, -2),
                 textcoords="offset points",
@@ -106,9 +106,13 @@ def write_alias_figure(studies: Mapping[str, Coning], spin: float, path: Path) -
     with style():
         figure = new_figure(7.5, 3.2)
         axes = figure.subplots()
-        for (name, coning), colour in zip(studies.items(), colours(len(studies)), strict=True):
+        for i, ((name, coning), colour) in enumerate(zip(studies.items(), colours(len(studies)), strict=True)):
             frequencies = [c.frequency for c in coning.candidates]
-            axes.plot(frequencies, 1e6 * np.array(coning.residuals), "o", color=colour, label=name, markersize=5.0)
+            # rings around each other where several numbers of heads leave one candidate
+            axes.plot(
+                frequencies, 1e6 * np.array(coning.residuals), "o", color=colour, label=name,
+                markersize=4.0 + 4.0 * i, markerfacecolor="none", markeredgewidth=1.6,
+            )  # fmt: skip
         axes.set_yscale("log")
         axes.set_xlabel("candidate of the coning frequency [Hz]")
         axes.set_ylabel("pulses missed by [us]")

@@ -58,6 +58,9 @@ class SlitPassages(Component):
         self._newest: tuple[int, Passage, SunAngle] | None = None
         self._refused = 0
         self._take, self._measure = typed_call(slit_passage.take_pulse), typed_call(slit_measurement.measure)
+        # compiled here, not at the first passage: the loop would wait
+        self._take(self._p.passage, self._heads[0], slit_passage.UPPER, 0)
+        self._measure(self._p, self._swing, Passage(True, REASON_NONE, 0, 1, 0, 0), 0.0)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         pulses = received["pulses"]

@@ -18,7 +18,7 @@ from css_environment.mission_environment import MissionEnvironment
 from css_estimation import flight_references, sun_field_attitude
 from css_estimation.messages import field_reading
 from css_estimation.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN
-from css_estimation.symmetric import Symmetric
+from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
 
 _ORDERS = {"best": ORDER_BEST, "sun": ORDER_SUN, "field": ORDER_FIELD}
@@ -82,6 +82,13 @@ class Triad(Component):
         self._interpolated = typed_call(sun_field_attitude.interpolated_field)
         self._variance = typed_call(sun_field_attitude.interpolated_variance)
         self._quaternion = typed_call(dcm_to_quaternion)
+        # compiled here, not at the first passage: the loop would wait
+        field_b = (0.0, 1e-5, 0.0)
+        self._interpolated(field_b, field_b, field_b, field_b, 0.5)
+        self._variance(0.0, 1e-5, 0.1, 0.5)
+        x = (1.0, 0.0, 0.0)
+        attitude = self._attitude(x, isotropic(0.0), field_b, 1e-14, x, field_b, self._order)
+        self._quaternion(attitude.dcm_bn)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         angle = received["angle"]

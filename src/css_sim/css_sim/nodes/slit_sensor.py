@@ -12,7 +12,7 @@ from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.vectors import vector_of
+from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import SlitPulse, SlitPulses, SpacecraftState
 from css_sim import slit_timer
 from css_sim.slit_crossings import SLITS_PER_HEAD, slit_crossings, slit_geometry
@@ -55,24 +55,30 @@ class SlitSensor(Component):
         self._ticks, self._codes = np.zeros(2 * room, dtype=np.int64), np.zeros((2 * room, 2), dtype=np.int64)
         self._crossings, self._read = typed_call(slit_crossings), typed_call(slit_timer.read_pulses)
         self._state, self._to_dcm = typed_call(payload_state), typed_call(mrp_to_dcm)
+        # compiled here, not at the first stamp: the loop would wait
+        self._pulses_between((1.0, 0.0, 0.0), 0, 0.0, 0.0)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
         assert truth is not None  # a required input
         end = (stamp_ns - self.epoch_ns) * 1e-9
         self._check(truth, end)
-        crossings = 0
+        pulses = 0
         if truth.illumination > _SUNLIT:
-            start = (stamp_ns - self.period_ns - self.epoch_ns) * 1e-9
-            crossings = self._crossings(
-                self._motion, self._geometry, vector_of(truth.sun_n), max(start, 0.0), end,
-                self._times, self._slits, self._heads,
-            )  # fmt: skip
-        pulses = self._read(
-            self._timer, self._key, self.step_of(stamp_ns), crossings,
+            start = max((stamp_ns - self.period_ns - self.epoch_ns) * 1e-9, 0.0)
+            pulses = self._pulses_between(vector_of(truth.sun_n), self.step_of(stamp_ns), start, end)
+        return self._messages(stamp_ns, self._ticks[:pulses], self._codes[:pulses])
+
+    def _pulses_between(self, sun_n: Vec3, step: int, start: float, end: float) -> int:
+        """Writes the pulses of one step into ticks and codes; returns their number."""
+        crossings = self._crossings(
+            self._motion, self._geometry, sun_n, start, end, self._times, self._slits, self._heads
+        )
+        pulses: int = self._read(
+            self._timer, self._key, step, crossings,
             self._times, self._slits, self._heads, self._ticks, self._codes,
         )  # fmt: skip
-        return self._messages(stamp_ns, self._ticks[:pulses], self._codes[:pulses])
+        return pulses
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
         return self._messages(stamp_ns, self._ticks[:0], self._codes[:0])

@@ -7,6 +7,7 @@ import numpy as np
 
 from css_common.mission import Mission
 from css_common.random_streams import random_key
+from css_environment.mission_environment import MissionEnvironment
 from css_estimation.coning import Coning, Passages
 from css_estimation.coning_angle import max_min_angle
 from css_estimation.slit_angles import motion_gain, quantum, sun_angle
@@ -27,8 +28,8 @@ def rate_rows(mission: Mission, passages: Passages) -> list[Row]:
     before, after = (_spin(passages.between(a, b)) for a, b in ((0.0, booms), (booms + 1.0, end)))
     note = "mean of turns; coning makes single turns read from 5.33 to 5.58 Hz at a constant spin"
     return [
-        row("rotation rate before boom deployment", "Hz", 6.0, before, _within(6.0, 0.005)),
-        row("rotation rate after boom deployment", "Hz", 5.45, after, _within(5.45, 0.005), note=note),
+        row("rotation rate before boom deployment", "Hz", 6.0, before, _within(6.0, 0.005), digits=4),
+        row("rotation rate after boom deployment", "Hz", 5.45, after, _within(5.45, 0.005), note=note, digits=4),
     ]
 
 
@@ -45,8 +46,8 @@ def angle_rows(legs: Legs, truth_max_min: float) -> list[Row]:
     fitted = math.degrees(0.5 * (legs.up.full_angle + legs.down.full_angle))
     read = math.degrees(0.5 * (legs.up.max_min_angle + legs.down.max_min_angle))
     return [
-        row("coning full angle, fitted", "deg", FULL_ANGLE, fitted, Must(FULL_ANGLE - 0.3, FULL_ANGLE + 0.3)),
-        row("coning full angle, maxima less minima", "deg", FULL_ANGLE, read, note=bias_note(legs.up, truth_max_min)),
+        row("coning full angle, fitted", "deg", FULL_ANGLE, fitted, Must(FULL_ANGLE - 0.3, FULL_ANGLE + 0.3), digits=4),
+        row("coning full angle, maxima less minima", "deg", FULL_ANGLE, read, note=bias_note(legs.up, truth_max_min), digits=4),
     ]
 
 
@@ -77,8 +78,6 @@ def true_max_min(mission: Mission, coning: Coning, passages: Passages) -> float:
 
 def sun_direction(mission: Mission) -> np.ndarray:
     """(3,) direction to the Sun in n half-way through the flight, in which it turns by 1e-4 rad."""
-    from css_environment.mission_environment import MissionEnvironment
-
     environment = MissionEnvironment(mission.node("slit_sensor").values, field=False)
     return np.array(environment.at(0.5 * mission.values.mission.duration).sun_n)
 
@@ -98,8 +97,8 @@ def period_rows(legs: Legs, drifting: Legs) -> list[Row]:
             f"{resolution:.1f} ms, less than the 2.3 ms between the paper's legs. With a drift of the period over the "
             "phase (payload.final_coning_period) both of the paper's numbers come out"
         )
-        rows.append(row("coning period up-leg, FFT", "s", UP_PERIOD, up, up_must, note=note, variant=variant))
-        rows.append(row("coning period down-leg, FFT", "s", DOWN_PERIOD, down, down_must, note=note, variant=variant))
+        rows.append(row("coning period up-leg, FFT", "s", UP_PERIOD, up, up_must, note=note, variant=variant, digits=4))
+        rows.append(row("coning period down-leg, FFT", "s", DOWN_PERIOD, down, down_must, note=note, variant=variant, digits=4))
     return rows
 
 

@@ -122,7 +122,7 @@ def _candidates(name: str, coning: Coning) -> list[Block]:
         ]
         for i, (c, residual) in enumerate(zip(coning.candidates, coning.residuals, strict=True))
     ]
-    return [f"{name}: chosen because it {justification(coning)}.", Table(heading, lines)]
+    return [f"{name}, {1.0 / coning.frequency:.4f} s: {justification(coning)}.", Table(heading, lines)]
 
 
 def _attitude_section(errors: AttitudeErrors, cases: AttitudeCases, folder: Path) -> Section:
@@ -154,7 +154,7 @@ def _head_section(studies: dict[str, Coning], folder: Path) -> Section:
         for name, coning in studies.items()
     ]
     text = (
-        "The paper proposes several sensors around the perimeter. Four leave one frequency alone, and maxima and "
-        "minima of the Sun angle come closer to the cone."
+        "The paper proposes several sensors around the perimeter. Four leave one frequency alone, and their maxima "
+        "and minima of the Sun angle come closer to the cone; two leave one other, and find no more extrema than one."
     )
     return Section("Several heads", [text, Table(heading, lines), Picture(figure.name, "What each number leaves open.")])
