@@ -97,7 +97,7 @@ def _print_table(paper: Paper, rows: Sequence[Row], console: Console) -> None:
 def _result(row: Row | None) -> Text:
     if row is None:
         return Text("")
-    return Text(number(row.here), style="" if row.ok else "bold red")
+    return Text(number(row.here, row.digits), style="" if row.ok else "bold red")
 
 
 if __name__ == "__main__":
