@@ -8,7 +8,7 @@ from flights import messages_by_topic, short_mission
 
 from css_bringup.composed import ComposedFlight
 from css_bringup.processes import fly_processes
-from css_recording.process import StopSignal
+from css_common.stop_signal import StopSignal
 
 
 def _interrupt() -> None:
@@ -48,11 +48,13 @@ def test_processes_end_with_their_flight(tmp_path):
     assert result.interrupted
     assert not result.failure
     (supervisor,) = supervisors
-    codes = [child.poll() for child in (*supervisor.children.values(), supervisor.recorder)]
-    assert None not in codes
-    # the interrupt ended none of them unhandled
-    assert -signal.SIGINT not in codes
-    assert messages_by_topic(bag)["/truth"]
+    assert [child.poll() for child in (*supervisor.children.values(), supervisor.recorder)] == [0] * 6
+    # time held at the last stamp until all had answered it
+    assert result.steps > 0
+    assert result.messages_lost == 0
+    recorded = messages_by_topic(bag)
+    topics = result.mission.topics
+    assert {topic: len(recorded[f"/{topic}"]) for topic in topics} == dict.fromkeys(topics, result.steps)
 
 
 def test_signals_mean_afterwards_what_they_meant_before():

@@ -4,6 +4,7 @@
 import os
 import signal
 
+import pytest
 from flights import fly_composed, messages_by_topic, short_mission
 
 from css_bringup.processes import fly_processes
@@ -71,6 +72,13 @@ def test_without_the_plant_the_run_ends(tmp_path):
     bag = tmp_path / "bag"
     result = fly_processes(short_mission(5000.0), bag, tmp_path / "logs", _Killer("dynamics", 1, bag))
     assert "dynamics died (SIGKILL), the spacecraft's state is lost with it" in result.failure
+    # the plant left no figures: the recording tells how far it came
+    recorded = {topic: len(messages) for topic, messages in messages_by_topic(bag).items()}
+    assert result.steps == max(recorded["/truth"], recorded["/wheels/state"]) > 10
+    assert result.simulated_s == pytest.approx(0.1 * result.steps)
+    assert result.messages_recorded == sum(recorded.values())
+    # at most what the cycle lacks in which it died
+    assert result.messages_lost < len(recorded)
 
 
 def test_a_killed_recorder_ends_the_run_and_its_recording_is_recovered(tmp_path):

@@ -7,7 +7,7 @@ from setuptools import find_packages, setup
 
 PACKAGE = "css_sim"
 EXECUTABLES = [
-    f"{file.stem} = {PACKAGE}.{folder}.{file.stem}:main"
+    f"{file.stem} = css_common.entry:main"
     for folder in ("nodes", "commands")
     for file in sorted(Path(PACKAGE, folder).glob("[a-z]*.py"))
 ]

@@ -26,13 +26,16 @@ class ComposedFlight:
     Use as a context manager: nodes exist inside it, `fly` may be called once, `nodes` are there to be inspected.
     """
 
-    def __init__(self, mission: Mission, bag: Path | None = None, executor: str | None = None) -> None:
+    def __init__(
+        self, mission: Mission, bag: Path | None = None, executor: str | None = None, *, overwrite: bool = False
+    ) -> None:
         """Prepares a flight.
 
         Args:
             mission: what to fly.
             bag: where to record; None records nothing.
             executor: kind of executor, see `create_executor`.
+            overwrite: replace a recording that is there.
 
         Raises:
             MissionError: no node of the mission owns simulated time.
@@ -46,6 +49,7 @@ class ComposedFlight:
         self.nodes: dict[str, ComponentNode] = {}
         self.recorder: RecorderNode | None = None
         self._executor_kind = executor
+        self._overwrite = overwrite
 
     def __enter__(self) -> "ComposedFlight":
         self.context.init()
@@ -53,7 +57,9 @@ class ComposedFlight:
         mission = self.mission
         if self.bag is not None:
             mission = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
-            self.recorder = RecorderNode(self.mission, self.bag, context=self.context, use_global_arguments=False)
+            self.recorder = RecorderNode(
+                self.mission, self.bag, overwrite=self._overwrite, context=self.context, use_global_arguments=False
+            )
             self.executor.add_node(self.recorder)
         for node in mission.nodes:
             self.nodes[node.name] = create_node(

@@ -14,10 +14,12 @@ from css_bringup.composed import ComposedFlight
 from css_bringup.flight import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
 from css_common.mission import Mission
-from css_recording.process import StopSignal
+from css_common.stop_signal import StopSignal
 
 
-def fly(mission: Mission, bag: Path | None, *, processes: bool, console: Console) -> FlightResult:
+def fly(
+    mission: Mission, bag: Path | None, *, processes: bool, console: Console, overwrite: bool = False
+) -> FlightResult:
     """Flies a mission to its end, or until Ctrl-C or SIGTERM, after which the recording is complete up to there.
 
     Args:
@@ -25,15 +27,18 @@ def fly(mission: Mission, bag: Path | None, *, processes: bool, console: Console
         bag: where to record; None records nothing.
         processes: one process per node instead of one for all.
         console: where progress is shown, when it is a terminal.
+        overwrite: replace a recording that is there.
     """
     # noted, not raised: an exception would tear a cycle apart, and a second Ctrl-C the clean-up
     with StopSignal() as stop:
         if processes:
-            return _fly_processes(mission, bag, console, stop)
-        return _fly_composed(mission, bag, console, stop)
+            return _fly_processes(mission, bag, console, stop, overwrite)
+        return _fly_composed(mission, bag, console, stop, overwrite)
 
 
-def _fly_processes(mission: Mission, bag: Path | None, console: Console, stop: StopSignal) -> FlightResult:
+def _fly_processes(
+    mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
+) -> FlightResult:
     home = Path(os.environ.get("SUNPOINT_HOME", "."))
     logs = home / "log" / "flights" / (bag.name if bag else mission.name)
     status = f"flying {mission.name}, one process per node; logs in {logs}"
@@ -46,11 +51,13 @@ def _fly_processes(mission: Mission, bag: Path | None, console: Console, stop: S
         named = len(supervisor.notes)
 
     with console.status(escape(status)) if _live(console) else nullcontext():
-        return fly_processes(mission, bag, logs, name_restarts, lambda: stop.came)
+        return fly_processes(mission, bag, logs, name_restarts, lambda: stop.came, overwrite=overwrite)
 
 
-def _fly_composed(mission: Mission, bag: Path | None, console: Console, stop: StopSignal) -> FlightResult:
-    with ComposedFlight(mission, bag) as flight:
+def _fly_composed(
+    mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
+) -> FlightResult:
+    with ComposedFlight(mission, bag, overwrite=overwrite) as flight:
         if not _live(console):
             return flight.fly(stopped=lambda: stop.came)
         bar = Progress(

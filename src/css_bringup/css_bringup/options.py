@@ -9,9 +9,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from css_common.mission import Mission, load_mission
+from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError
+from css_common.schema import unknown_name
 from css_recording.errors import BagError
+from css_studies.flight_metrics import QUANTITIES
 
 FAILED = 1
 USAGE = 2
@@ -37,7 +39,7 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
 
 
 def mission_of(arguments: argparse.Namespace) -> Mission:
-    """The mission that the options describe.
+    """The mission that the options describe; events after its end are named on standard error.
 
     Raises:
         MissionError: it is wrong.
@@ -47,7 +49,16 @@ def mission_of(arguments: argparse.Namespace) -> Mission:
         value = getattr(arguments, key)
         if value is not None:
             overrides.append(f"mission.{key}={value}")
-    return load_mission(arguments.mission, overrides)
+    mission = load_mission(arguments.mission, overrides)
+    for quantity in mission.criteria:
+        # measured by studies, which the packages that read missions know nothing of
+        if quantity not in QUANTITIES:
+            raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
+    last = (mission.steps - 1) * mission.values.mission.period
+    for event in mission.events:
+        if event.time > last + 1e-9:
+            complain("warning:", f"event {event.name} at {event.time:g} s never comes, the last step is at {last:g} s")
+    return mission
 
 
 def whole_number(text: str) -> int:
@@ -64,6 +75,7 @@ def whole_number(text: str) -> int:
 def add_output_options(parser: argparse.ArgumentParser) -> None:
     """Where results go and how they are printed."""
     parser.add_argument("--out", type=Path, metavar="DIR", help="recording folder (default: bags/MISSION_CASE_TIME)")
+    parser.add_argument("--overwrite", action="store_true", help="replace a recording that is there")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
 
 

@@ -11,7 +11,7 @@ import signal
 import subprocess
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -24,6 +24,7 @@ from css_common.mission_file import MissionError
 
 RECORDER = "recorder"
 _POLL = 0.02
+_RESTART_LIMIT = 60.0  # wall time [s] within which a second death of a node ends the run
 
 
 @dataclass
@@ -39,9 +40,9 @@ class Child:
     asked_to_end: bool = False
 
     def start(self) -> None:
-        """Starts the process; its output is appended to its log."""
+        """Starts the process; its log begins anew with the flight and goes on after a restart."""
         self.asked_to_end = False
-        self.stream = self.log.open("ab")
+        self.stream = self.log.open("wb" if self.process is None else "ab")
         # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
         self.process = subprocess.Popen(
             self.command, stdout=self.stream, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
@@ -95,14 +96,14 @@ def executable_path(package: str, executable: str) -> str:
 class Supervisor:
     """Starts, watches and stops the processes of a flight."""
 
-    def __init__(self, mission: Mission, bag: Path | None, logs: Path, restart_limit_s: float = 60.0) -> None:
+    def __init__(self, mission: Mission, bag: Path | None, logs: Path, *, overwrite: bool = False) -> None:
         """Prepares a flight; `start` begins it.
 
         Args:
             mission: what to fly.
             bag: where to record; None records nothing.
             logs: folder for the nodes' logs.
-            restart_limit_s: a node that dies twice within this wall time ends the run.
+            overwrite: replace a recording that is there.
 
         Raises:
             MissionError: an executable is missing, or no node owns simulated time.
@@ -113,7 +114,7 @@ class Supervisor:
         self.bag = bag
         self._plant_name = mission.plant.name
         self.logs = logs
-        self.restart_limit_s = restart_limit_s
+        self._overwrite = overwrite
         self.notes: list[str] = []
         self.failure = ""
         self._folder = tempfile.TemporaryDirectory(prefix="sunpoint_")
@@ -137,6 +138,7 @@ class Supervisor:
     def _recorder(self) -> Child:
         command = [executable_path("css_recording", RECORDER), "--mission", str(self._parameters)]
         command += ["--output", str(self.bag), "--summary", str(self._summary(RECORDER))]
+        command += ["--overwrite"] if self._overwrite else []
         return Child(RECORDER, command, self.logs / f"{RECORDER}.log")
 
     @property
@@ -166,8 +168,8 @@ class Supervisor:
             if child is self.recorder:
                 self._fail(child, code, "the flight is not recorded any more")
                 return False
-            if len(child.deaths) > 1 and now - child.deaths[-2] < self.restart_limit_s:
-                self._fail(child, code, f"for the second time within {self.restart_limit_s:g} s")
+            if len(child.deaths) > 1 and now - child.deaths[-2] < _RESTART_LIMIT:
+                self._fail(child, code, f"for the second time within {_RESTART_LIMIT:g} s")
                 return False
             self.notes.append(f"{child.name} died ({_cause(code)}) and was restarted")
             child.stop(0.0)
@@ -175,7 +177,8 @@ class Supervisor:
         return True
 
     def stop(self) -> None:
-        """Ends all processes: nodes first, then the recorder, which takes what they published last."""
+        """Ends all processes: the plant first, whose last stamp the others answer, and the recorder last."""
+        self.plant.stop(5.0)
         for child in self.children.values():
             child.interrupt()
         for child in self.children.values():
@@ -213,6 +216,8 @@ def fly_processes(
     logs: Path,
     on_poll: Callable[[Supervisor], None] | None = None,
     stopped: Stopped = lambda: False,
+    *,
+    overwrite: bool = False,
 ) -> FlightResult:
     """Flies a mission with one process per node.
 
@@ -222,9 +227,10 @@ def fly_processes(
         logs: folder for the nodes' logs.
         on_poll: called between looks at the processes.
         stopped: the flight is asked to end.
+        overwrite: replace a recording that is there.
     """
     result = FlightResult(mission, bag=bag)
-    supervisor = Supervisor(mission, bag, logs)
+    supervisor = Supervisor(mission, bag, logs, overwrite=overwrite)
     try:
         supervisor.start()
         while supervisor.check():
@@ -239,12 +245,21 @@ def fly_processes(
     finally:
         supervisor.stop()
     result.failure, result.notes = supervisor.failure, supervisor.notes
+    recorded = supervisor.summary(RECORDER).get("recorded", {})
+    result.recorded = {f"/{topic}": recorded.get(f"/{topic}", 0) for topic in mission.topics}
     flown = supervisor.summary(supervisor.plant.name)
     if flown:
         result.wall_s = flown["wall_s"]
         result.steps = flown["counters"].get("cycles", 0)
-        result.simulated_s = result.steps * mission.period_ns * 1e-9
+    else:
+        result.steps = _recorded_steps(mission, result.recorded)
+    result.simulated_s = result.steps * mission.period_ns * 1e-9
     result.cpu_s = sum(supervisor.summary(name).get("cpu_s", 0.0) for name in (*supervisor.children, RECORDER))
-    result.recorded = supervisor.summary(RECORDER).get("recorded", {})
     supervisor.clean()
     return result
+
+
+def _recorded_steps(mission: Mission, recorded: Mapping[str, int]) -> int:
+    """Control cycles of a plant that could not tell: those of which the recording has a message of its own."""
+    assert mission.plant is not None
+    return max(0, *((recorded[f"/{o.topic}"] - 1) * o.divider + 1 for o in mission.plant.outputs))

@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people type: estimator requests, missions, options; and what they get when it is wrong."""
 
+import argparse
 import json
+import sys
 from pathlib import Path
 
 import pytest
 
+from css_bringup import options
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
 from css_bringup.flight import FlightResult, default_bag
 from css_bringup.options import FAILED, USAGE
+from css_bringup.processes import Child, Supervisor
 from css_bringup.replay import parse_request
 from css_bringup.report import flight_object
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
+from css_studies.flight_log import read_flight
+from css_studies.flight_metrics import QUANTITIES
 
 ROOT = Path(__file__).parents[3]
 WITHOUT_ESTIMATOR = "css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"
@@ -46,6 +52,8 @@ def test_requests_of_another_form_are_refused(text):
         (["okeefe_2013", "--set", "nonsense"], "KEY=VALUE"),
         (["okeefe_2013", "--set", f"graph.nodes={WITHOUT_ESTIMATOR}"], "needs the topic"),
         (["okeefe_2013", "--set", "graph.nodes=css_sim/dynamo"], "no css_sim/nodes/dynamo.py"),
+        (["okeefe_2013", "--set", "ekf.gate=-1"], "override ekf.gate: -1.0 given"),
+        (["okeefe_2013", "--set", "orbit.eccentricity=0.5"], "puts the perigee at -2989 km; expected at most 0.0442"),
     ],
 )
 @pytest.mark.parametrize("command", [fly, demo])
@@ -54,6 +62,78 @@ def test_a_wrong_mission_is_one_line_and_exit_code_2(command, arguments, said, c
     printed = capfd.readouterr().err
     assert said in " ".join(printed.split())
     assert "Traceback" not in printed
+
+
+CRITERION = "    criteria: {pointing_error_mean: {max: 5.0}}\n"
+EVENT = "    events: {off: {time: 2.0, node: gyro, action: deactivate}}\n"
+
+
+def _mission_file(folder: Path, line: str) -> Path:
+    file = folder / "mission.yaml"
+    file.write_text(f"/**:\n  ros__parameters:\n    mission: {{period: 0.1}}\n{line}")
+    return file
+
+
+def _mission_of(file: Path, *arguments: str):
+    parser = argparse.ArgumentParser()
+    options.add_mission_options(parser)
+    return options.mission_of(parser.parse_args([str(file), *arguments]))
+
+
+def test_a_criterion_that_nobody_measures_is_refused_before_the_flight(tmp_path, capfd):
+    assert fly.main([str(_mission_file(tmp_path, CRITERION))]) == USAGE
+    said = "criteria.pointing_error_mean: unknown; did you mean pointing_error_mean_deg?"
+    assert said in " ".join(capfd.readouterr().err.split())
+
+
+def test_every_measured_quantity_may_be_a_criterion(tmp_path):
+    limits = ", ".join(f"{quantity}: {{max: 5.0}}" for quantity in QUANTITIES)
+    mission = _mission_of(_mission_file(tmp_path, f"    criteria: {{{limits}}}\n"))
+    assert list(mission.criteria) == list(QUANTITIES)
+
+
+@pytest.mark.parametrize(("duration", "warned"), [("2.0", True), ("2.1", False)])
+def test_an_event_after_the_last_step_is_named(tmp_path, capfd, duration, warned):
+    mission = _mission_of(_mission_file(tmp_path, EVENT), "--duration", duration)
+    assert [event.name for event in mission.events] == ["off"]
+    said = "warning: event off at 2 s never comes, the last step is at 1.9 s\n" if warned else ""
+    assert capfd.readouterr().err == said
+
+
+@pytest.mark.parametrize("text", ["", "# nothing yet\n", "{}", "/**: {ros__parameters: {}}"])
+def test_a_file_without_parameters_is_no_mission(tmp_path, capfd, text):
+    (tmp_path / "empty.yaml").write_text(text)
+    assert fly.main([str(tmp_path / "empty.yaml")]) == USAGE
+    assert "empty.yaml: holds no parameters" in capfd.readouterr().err
+
+
+def test_a_recording_is_replaced_only_when_asked_for(tmp_path, capfd):
+    arguments = ["okeefe_2013", "--out", str(tmp_path / "bag"), "--duration"]
+    assert fly.main([*arguments, "1"]) != USAGE
+    assert fly.main([*arguments, "2"]) == USAGE
+    assert "--overwrite" in capfd.readouterr().err
+    assert read_flight(tmp_path / "bag").truth.stamp_ns.size == 10
+    assert fly.main([*arguments, "2", "--overwrite"]) != USAGE
+    assert read_flight(tmp_path / "bag").truth.stamp_ns.size == 20
+
+
+def test_the_recorder_of_processes_replaces_only_when_asked_for(tmp_path):
+    mission = load_mission("okeefe_2013")
+    for overwrite in (False, True):
+        supervisor = Supervisor(mission, tmp_path / "bag", tmp_path / "logs", overwrite=overwrite)
+        assert ("--overwrite" in supervisor.recorder.command) == overwrite
+        supervisor.clean()
+
+
+def test_a_log_begins_with_its_flight_and_goes_on_after_a_restart(tmp_path):
+    log = tmp_path / "node.log"
+    log.write_text("of an earlier flight\n")
+    child = Child("node", [sys.executable, "-c", "print('started')"], log)
+    for starts in (1, 2):
+        child.start()
+        child.process.wait()
+        child.stop(0.0)
+        assert log.read_text() == "started\n" * starts
 
 
 def test_a_missing_recording_is_one_line_and_exit_code_2(tmp_path, capfd):

@@ -180,3 +180,10 @@ def mrp_angle(sigma_bn: Vec3) -> float:
     s = math.sqrt(dot(sigma_bn, sigma_bn))
     angle = 4.0 * math.atan(s)
     return angle if angle <= math.pi else 2.0 * math.pi - angle
+
+
+@kernel
+def mrp_to_rotation_vector(sigma_bn: Vec3) -> Vec3:
+    """Rotation vector [rad], of length up to pi, of an MRP set with |sigma| <= 1."""
+    s = math.sqrt(dot(sigma_bn, sigma_bn))
+    return scale(4.0 * math.atan(s) / s if s > 1e-8 else 4.0, sigma_bn)

@@ -6,7 +6,7 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -83,8 +83,15 @@ def messages_of(outgoing: Outgoing) -> Iterator[tuple[str, Sample]]:
             yield key, given
 
 
+def _unheard(text: str) -> None:
+    """Where the reports of a component without a host go."""
+
+
 class Component:
     """One part of the flight graph, cycled once per step.
+
+    Attributes:
+        report: takes a line for the log; a host makes it the node's.
 
     Class attributes:
         shared: mission sections whose values the component reads (`sections.SECTIONS`), besides mission and io.
@@ -98,6 +105,7 @@ class Component:
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
         self.values = values
+        self.report: Callable[[str], object] = _unheard
         self.period_ns = round(values.mission.period * 1e9)
         self.epoch_ns = parse_utc(values.mission.epoch)
         self.frames = {

@@ -178,6 +178,7 @@ class ComponentNode(LifecycleNode):
             raise ParameterError(reason)
         name = self.get_name()
         self.component = self.component_type(name, shaped_values(self._table, self._canonical))
+        self.component.report = self.get_logger().info
         values = self.component.values
         inputs = self.component_type.inputs(name, values)
         rehearse(self.component_type, name, values)

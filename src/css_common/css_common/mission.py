@@ -12,7 +12,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -187,11 +187,12 @@ class Mission:
             key, separator, text = override.partition("=")
             if not separator:
                 raise MissionError(f"{override!r} is no override, expected KEY=VALUE")
-            section, specification = self._find(key.strip())
+            key = key.strip()
+            section, specification = self._find(key)
             try:
-                value = specification.parse(text)
+                value = replace(specification, name=key).parse(text)  # errors name it as it was typed
             except ParameterError as error:
-                raise MissionError(f"override: {error}") from error
+                raise MissionError(f"override {error}") from error
             parameters.setdefault(section, {})[specification.name] = value
         return Mission(self.origin, parameters)
 
@@ -439,6 +440,8 @@ def load_mission(name: str | Path, overrides: Iterable[str] = ()) -> Mission:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise MissionError(f"{path}: cannot be read: {error}") from error
+    if not any(read_sections(text, str(path)).values()):
+        raise MissionError(f"{path}: holds no parameters, expected sections such as {SHARED}: {{ros__parameters: ...}}")
     return mission_from_text(text, str(path), overrides)
 
 

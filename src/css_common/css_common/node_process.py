@@ -2,14 +2,16 @@
 """The process of one node: command line, mission, ROS start, clean end."""
 
 import json
-import signal
 import sys
+import time
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
 import rclpy
 from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import Executor
+from rclpy.signals import SignalHandlerOptions
 
 from css_common.codec import type_name
 from css_common.component import Component, Plant
@@ -20,8 +22,14 @@ from css_common.mission_file import MissionError, flattened, read_sections
 from css_common.plant_host import PlantNode
 from css_common.schema import ParameterError, default_values, unknown_name
 from css_common.sections import GRAPH
+from css_common.stop_signal import StopSignal
 
 USAGE_ERROR = 2
+# Wall times [s] at the end: for answers to the last stamp of a plant; for what is on its way to another node, and
+# without any of it after which there is no more.
+_ANSWER_LIMIT = 2.0
+_DRAIN_LIMIT = 0.5
+_QUIET = 0.1
 
 
 def main(component_type: type[Component], arguments: list[str]) -> int:
@@ -38,77 +46,104 @@ def create_node(component_type: type[Component], name: str, mission: Mission, **
     return host(component_type, name, mission, **options)
 
 
-class FirstInterrupt:
-    """Makes the first Ctrl-C a KeyboardInterrupt and every later one nothing.
-
-    Attributes:
-        armed: the next Ctrl-C raises; false from the first one on, and once cleaning up has begun.
-    """
-
-    def __init__(self) -> None:
-        self.armed = True
-        signal.signal(signal.SIGINT, self._raise_once)
-
-    def _raise_once(self, number: int, frame: object) -> None:
-        if self.armed:
-            self.armed = False
-            raise KeyboardInterrupt
-
-
 def run_node(component_type: type[Component], arguments: list[str]) -> int:
     """Runs one node until it is told to stop; 0 on a clean end, 1 when it failed, 2 on bad parameters.
 
-    `--summary FILE` before `--ros-args` leaves the figures of the run in a JSON file at its end.
+    A node that is told to stop finishes what it is at and answers what has arrived; a plant leaves the stamp that it
+    has reached to be answered. `--summary FILE` before `--ros-args` leaves the figures of the run in a JSON file.
     """
     summary = None
     if "--summary" in arguments[:-1]:
         at = arguments.index("--summary")
         summary = Path(arguments[at + 1])
         arguments = arguments[:at] + arguments[at + 2 :]
-    interrupt = FirstInterrupt()
-    started: list[ComponentNode] = []
+    process = _Process(component_type, summary)
     try:
         try:
-            return _create_and_spin(component_type, arguments, started)
+            return process.run(arguments)
         finally:
-            interrupt.armed = False  # from here on nothing tears the clean-up apart
+            process.stop.raises = False  # from here on nothing tears the clean-up apart
     except KeyboardInterrupt:
         return 0
     finally:
-        for node in started:
-            if summary is not None:
-                summary.write_text(json.dumps(node.summary()), encoding="utf-8")
-            node.finish()
-            node.destroy_node()
-        rclpy.try_shutdown()
+        process.end()
 
 
-def _create_and_spin(component_type: type[Component], arguments: list[str], started: list[ComponentNode]) -> int:
-    executable = component_type.__module__.rpartition(".")[2]
-    try:
-        mission = mission_of_arguments(component_type, arguments)
-        rclpy.init(args=[sys.argv[0], *arguments])
-        executor = create_executor()
-        node = create_node(component_type, executable, mission)
-        started.append(node)
-        executor.add_node(node)
-        if not node.start():
-            return USAGE_ERROR if rclpy.ok() else 0
-        plant = node if isinstance(node, PlantNode) else None
-        spin_until(executor, lambda: plant is not None and plant.done)
-        return 1 if plant is not None and plant.failed else 0
-    except (MissionError, ParameterError) as error:
-        print(f"{executable}: {error}", file=sys.stderr)
-        return USAGE_ERROR
-    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
-        if not started:
-            print(f"{executable}: {' '.join(str(error).split())}", file=sys.stderr)
+class _Process:
+    """What a process holds from its start to its end."""
+
+    def __init__(self, component_type: type[Component], summary: Path | None) -> None:
+        self.stop = StopSignal(raises=True)
+        self._component_type = component_type
+        self._executable = component_type.__module__.rpartition(".")[2]
+        self._summary = summary
+        self._executor: Executor | None = None
+        self._node: ComponentNode | None = None
+
+    def run(self, arguments: list[str]) -> int:
+        """Starts the node and lets it work; the exit code."""
+        try:
+            mission = mission_of_arguments(self._component_type, arguments)
+            # Signals are handled here: rclpy would shut its context down with messages still waiting to be answered,
+            # and an exception that a signal raises in a callback would pass through the executor's C++ frames.
+            rclpy.init(args=[sys.argv[0], *arguments], signal_handler_options=SignalHandlerOptions.NO)
+            self._executor = create_executor()
+            self._node = create_node(self._component_type, self._executable, mission)
+        except (MissionError, ParameterError) as error:
+            return self._refuse(str(error))
+        except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+            return self._refuse(" ".join(str(error).split()))
+        self._executor.add_node(self._node)
+        if not self._node.start():
             return USAGE_ERROR
-        if rclpy.ok():
-            raise
-        return 0  # a signal ended ROS while the node was being set up
-    except ExternalShutdownException:
+        self.stop.raises = False
+        return self._spin(self._executor, self._node)
+
+    def _refuse(self, reason: str) -> int:
+        print(f"{self._executable}: {reason}", file=sys.stderr)
+        return USAGE_ERROR
+
+    def _spin(self, executor: Executor, node: ComponentNode) -> int:
+        plant = node if isinstance(node, PlantNode) else None
+        spin_until(executor, lambda: self.stop.came or (plant is not None and plant.done))
+        if plant is not None:
+            plant.halt()
+            _spin_for(executor, _ANSWER_LIMIT, lambda: bool(plant.failed) or plant.answered)
+            return 1 if plant.failed else 0
+        _spin_for(executor, _DRAIN_LIMIT, _Quiet(node))
         return 0
+
+    def end(self) -> None:
+        """Gives everything up, the executor first: the middleware calls into it from threads of its own."""
+        if self._executor is not None:
+            self._executor.shutdown()
+        if self._node is not None:
+            if self._summary is not None:
+                self._summary.write_text(json.dumps(self._node.summary()), encoding="utf-8")
+            self._node.finish()
+            self._node.destroy_node()
+        rclpy.try_shutdown()
+        self.stop.ignore()
+
+
+class _Quiet:
+    """True once a node has had no cycle for a while."""
+
+    def __init__(self, node: ComponentNode) -> None:
+        self._node = node
+        self._cycles = -1
+        self._since = 0.0
+
+    def __call__(self) -> bool:
+        now, cycles = time.monotonic(), self._node.counters["cycles"]
+        if cycles != self._cycles:
+            self._cycles, self._since = cycles, now
+        return now - self._since > _QUIET
+
+
+def _spin_for(executor: Executor, seconds: float, done: Callable[[], bool]) -> None:
+    limit = time.monotonic() + seconds
+    spin_until(executor, lambda: done() or time.monotonic() > limit, interval=0.01)
 
 
 def mission_of_arguments(component_type: type[Component], arguments: list[str]) -> Mission:

@@ -54,6 +54,11 @@ class PlantNode(ComponentNode):
         """True once all partners were there and the first messages are out."""
         return self._begun
 
+    @property
+    def answered(self) -> bool:
+        """Nobody owes an answer to the stamp that the flight has reached."""
+        return not self._begun or all(key in self._answers for key in self._needed())
+
     def halt(self) -> None:
         """Ends the flight at the stamp it has reached: partners may still answer it, no step follows."""
         self.done = True
@@ -232,7 +237,7 @@ class PlantNode(ComponentNode):
     def _advance_if_answered(self) -> None:
         if not self._begun or self.done or not self._is_active or self._held_back is not None:
             return
-        if all(key in self._answers for key in self._needed()):
+        if self.answered:
             self._advance()
 
     def _needed(self) -> Collection[str]:

@@ -4,16 +4,19 @@
 They stand under `/**` in a mission file. Defaults are the spacecraft and orbit of O'Keefe & Schaub 2013.
 """
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
 
 from css_common.codec import MAX_FRAME
+from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
 from css_common.schema import Table, Values, choice, flag, integer, real, reals, text, texts
 
 _R = 0.7071067811865476
 _LAST_STAMP_NS = 2**31 * 1_000_000_000
+_LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
 MISSION: Table = (
     text("mission.name", "okeefe_2013", "name of the mission, as in the file name"),
@@ -27,7 +30,7 @@ MISSION: Table = (
 
 ORBIT: Table = (
     choice("orbit.source", "elements", ("elements", "tle", "ballistic"), "what defines the orbit"),
-    real("orbit.altitude", 400e3, "m", "semi-major axis above the equatorial radius", low=100e3, high=1e9),
+    real("orbit.altitude", 400e3, "m", "semi-major axis above the equatorial radius", low=_LOWEST, high=1e9),
     real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9),
     real("orbit.inclination_deg", 45.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
     real("orbit.raan_deg", 60.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
@@ -252,10 +255,8 @@ def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values of the shared sections, one message each: key, value, what was expected."""
     if hasattr(values, "mission"):
         yield from _mission_conflicts(values.mission)
-    if hasattr(values, "orbit") and values.orbit.source == "tle":
-        for key in ("tle_line1", "tle_line2"):
-            if len(getattr(values.orbit, key)) != 69:
-                yield f"orbit.{key}: expected the 69 characters of a two-line element set"
+    if hasattr(values, "orbit"):
+        yield from _orbit_conflicts(values.orbit)
     if hasattr(values, "spacecraft"):
         yield from _spacecraft_conflicts(values.spacecraft)
     if hasattr(values, "cells"):
@@ -290,6 +291,22 @@ def _mission_conflicts(mission: Values) -> Iterator[str]:
         yield (
             f"mission.epoch: {mission.epoch} given, expected a flight of {mission.duration:g} s between "
             "1970-01-01 and 2038-01-19: the seconds of a ROS stamp have 32 bits"
+        )
+
+
+def _orbit_conflicts(orbit: Values) -> Iterator[str]:
+    if orbit.source == "tle":
+        for key in ("tle_line1", "tle_line2"):
+            if len(getattr(orbit, key)) != 69:
+                yield f"orbit.{key}: expected the 69 characters of a two-line element set"
+        return
+    axis = EARTH_RADIUS + orbit.altitude
+    perigee = axis * (1.0 - orbit.eccentricity) - EARTH_RADIUS
+    if perigee < _LOWEST - 1e-3:
+        most = math.floor((orbit.altitude - _LOWEST) / axis * 1e4) * 1e-4
+        yield (
+            f"orbit.eccentricity: {orbit.eccentricity:g} given, which with orbit.altitude {orbit.altitude:g} m puts "
+            f"the perigee at {perigee / 1e3:.0f} km; expected at most {most:.4f}, a perigee of {_LOWEST / 1e3:g} km"
         )
 
 

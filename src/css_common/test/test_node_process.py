@@ -17,6 +17,7 @@ from css_common.mission import find_component, mission_from_text
 from css_common.node_process import mission_of_arguments
 from css_common.schema import default_values
 from css_common.sections import GRAPH
+from css_common.stop_signal import StopSignal
 from css_common.testing import DEADLINE, Bench
 from css_msgs.msg import CssVoltages, SunEstimate
 
@@ -122,11 +123,8 @@ def test_what_the_mission_reader_refuses_ends_with_one_line_and_code_2(bad, tmp_
     monkeypatch.chdir(tmp_path)
     Path("bad.yaml").write_text("/**: {ros__parameters: {io: {deadlin: 1.0}}}\n")
     arguments, reason = BAD_BEFORE_ROS[bad]
-    interrupt = signal.getsignal(signal.SIGINT)
-    try:
+    with StopSignal():  # restores the handlers that the end of the process takes
         assert node_process.main(find_component("testbed", "estimator"), ["--ros-args", *arguments]) == 2
-    finally:
-        signal.signal(signal.SIGINT, interrupt)
     err = capsys.readouterr().err
     assert err.startswith(reason)
     assert err.count("\n") == 1

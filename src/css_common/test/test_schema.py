@@ -211,6 +211,8 @@ CONFLICTS = [
     ("mission", {"mission__epoch": "1969-12-31T00:00:00Z"}, "mission.epoch: "),
     ("mission", {"mission__epoch": "2038-01-19T03:00:00Z"}, "mission.epoch: "),
     ("orbit", {"orbit__source": "tle"}, "orbit.tle_line1: expected the 69 characters"),
+    ("orbit", {"orbit__eccentricity": 0.5}, "orbit.eccentricity: 0.5 given, which with orbit.altitude 400000 m puts"),
+    ("orbit", {"orbit__eccentricity": 0.05}, "at 61 km; expected at most 0.0442, a perigee of 100 km"),
     ("spacecraft", {"spacecraft__inertia": [1.0, 0.1, 0, 0, 1, 0, 0, 0, 1]}, "spacecraft.inertia: not symmetric"),
     ("spacecraft", {"spacecraft__inertia": [1.0, 0, 0, 0, -1, 0, 0, 0, 1]}, "spacecraft.inertia: eigenvalue -1 given"),
     ("spacecraft", {"spacecraft__inertia": [1.0, 0, 0, 0, 1, 0, 0, 0, 3]}, "break the triangle inequality"),

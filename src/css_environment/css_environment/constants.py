@@ -3,14 +3,13 @@
 
 import math
 
+from css_common.earth import EARTH_RADIUS as EARTH_RADIUS
+
 ASTRONOMICAL_UNIT = 149_597_870_700.0
 """Astronomical unit [m], IAU 2012 Resolution B2 (exact)."""
 
 SOLAR_RADIUS = 6.957e8
 """Nominal solar radius [m], IAU 2015 Resolution B3."""
-
-EARTH_RADIUS = 6_378_137.0
-"""Equatorial radius of the Earth [m], WGS 84 (NGA.STND.0036)."""
 
 EARTH_MU = 3.986004418e14
 """Gravitational parameter of the Earth with its atmosphere [m^3/s^2], WGS 84."""

@@ -7,7 +7,6 @@ import numpy as np
 
 from css_environment.constants import EARTH_ROTATION_RATE
 
-
 HIGHEST_DEGREE = 13
 """Of the spherical harmonics of IGRF."""
 

@@ -7,7 +7,7 @@ or as the output of each cell (`cell_voltages`), as DiGregorio & Crassidis compa
 turns with the mean of the gyro's readings at both ends, which is exact for a rate that changes evenly.
 
 It begins, and begins anew, from the Sun and the field together (`attitude_start`): when it has never had an attitude,
-when a step was too long to be bridged, when its uncertainty has grown beyond use, and when most measurements have
+when a step was too long to be bridged, when its uncertainty has grown beyond use, and when the field or the Sun has
 contradicted it for too long.
 """
 
@@ -83,18 +83,24 @@ def step(
     if state.started:
         state = _predict(p, state, memory, dt, gyro_b, gyro_ok)
     field_ok = field_valid and plausible_field(field_b) and plausible_field(references.field_n)
-    tally = Tally(0.0, 0, 0, 0, 0)
+    tally = Tally(0.0, 0, False, 0, 0)
     started_now = False
-    if not state.aligned or trace(attitude_block(memory.covariance)) > _USELESS:
+    distrusted = state.contradicted > p.restart_after
+    if not state.aligned or distrusted or trace(attitude_block(memory.covariance)) > _USELESS:
         begun, mask = find_start(p, memory, voltages, field_b, field_ok, references)
         if begun.found:
             started_now = True
             set_block(memory.covariance, ATTITUDE, begun.covariance)
-            state = with_alignment(with_attitude(state, dcm_to_mrp(begun.dcm_bn), state.bias_b), True, 0.0)
-            tally = Tally(0.0, 0, 0, mask, USED_FIELD | USED_SUN)
+            bias_b = state.bias_b
+            if distrusted:
+                bias_b = (0.0, 0.0, 0.0)
+                set_block(memory.covariance, BIAS, isotropic(p.bias_variance))
+            state = with_alignment(with_attitude(state, dcm_to_mrp(begun.dcm_bn), bias_b), True, 0.0)
+            tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
     if state.aligned and not started_now:
         state, tally = measure(p, state, memory, voltages, field_b, field_ok, references, light)
-        state = _judge(p, state, memory, dt, tally)
+        contradicted = state.contradicted + dt if tally.refused else state.contradicted
+        state = with_alignment(state, True, 0.0 if tally.taken > 0 and not tally.refused else contradicted)
     bound(memory.covariance, memory.largest)
     return _finish(state, gyro_b, gyro_ok, dt, started_now, tally)
 
@@ -124,19 +130,6 @@ def _predict(p, state: AttitudeState, memory: AttitudeMemory, dt: float, gyro_b:
     propagate(memory.covariance, rotation_vector_to_dcm(turn), dt, noise, p.bias_noise, gyro_ok)
     cell_calibration.add_drift(p.cells.calibration, memory.covariance, dt)
     return with_attitude(state, mrp_add(state.sigma_bn, rotation_vector_to_mrp(turn)), state.bias_b)
-
-
-@kernel
-def _judge(p, state: AttitudeState, memory: AttitudeMemory, dt: float, tally: Tally) -> AttitudeState:
-    """Gives the attitude up when most of what is measured has contradicted it for too long."""
-    if tally.offered == 0:
-        return state
-    contradicted = 0.0 if 2 * tally.taken >= tally.offered else state.contradicted + dt
-    if contradicted <= p.restart_after:
-        return with_alignment(state, True, contradicted)
-    set_block(memory.covariance, ATTITUDE, isotropic(LOST_VARIANCE))
-    set_block(memory.covariance, BIAS, isotropic(p.bias_variance))
-    return with_alignment(with_attitude(state, state.sigma_bn, (0.0, 0.0, 0.0)), False, 0.0)
 
 
 @kernel

@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.schema import Table, Values, choice, flag, real
+from css_common.attitude import mrp_shadow
+from css_common.schema import Table, Values, choice, flag, real, reals
+from css_common.vectors import Vec3
 from css_estimation import cell_calibration
 from css_estimation.cell_layout import cell_layout
 from css_estimation.cell_voltages import CellModel
@@ -44,6 +46,14 @@ PARAMETERS: Table = (
     real("gyro.bias_sigma_deg_s", 0.1, "deg/s", "its bias at the start, 1 sigma", low=0.0, high=100.0),
     real("gyro.limit_deg_s", 300.0, "deg/s", "a reading beyond it is not used", low=0.0, high=1e4),
     real("walk_without_gyro_deg", 1.0, "deg/sqrt(s)", "drift of the attitude without gyro", low=0.0, high=1e3),
+    choice(
+        "start.attitude",
+        "sun_and_field",
+        ("sun_and_field", "given"),
+        "begin with what Sun and field say together, or with start.sigma_bn",
+    ),
+    reals("start.sigma_bn", (0.0, 0.0, 0.0), "-", "MRP of the given attitude, b relative to n", length=3),
+    real("start.sigma_deg", 20.0, "deg", "its error about each axis, 1 sigma", low=0.0, open_low=True, high=100.0),
     real(
         "nis_gate_below_deg",
         10.0,
@@ -52,13 +62,28 @@ PARAMETERS: Table = (
         low=0.0,
         high=180.0,
     ),
-    real("restart_after", 60.0, "s", "contradiction of most measurements after which it starts anew", low=0.0, high=1e6),
+    real(
+        "restart_after",
+        60.0,
+        "s",
+        "after so long a contradiction with field or Sun it starts anew, once the two together give an attitude",
+        low=0.0,
+        high=1e6,
+    ),
     real("longest_step", 10.0, "s", "after a longer step the attitude is lost", low=0.0, open_low=True, high=1e6),
     *cell_calibration.PARAMETERS,
 )
 
 LOST_VARIANCE = math.pi**2 / 3.0
 """Variance [rad^2] of each component of the attitude error when nothing is known."""
+
+
+class GivenStart(NamedTuple):
+    """Attitude to begin with."""
+
+    is_given: bool
+    sigma_bn: Vec3
+    variance: float  # of its error about each axis [rad^2]
 
 
 class AttitudeParameters(NamedTuple):
@@ -75,6 +100,7 @@ class AttitudeParameters(NamedTuple):
     bias_variance: float
     gyro_limit: float
     noise_without_gyro: float  # [rad^2/s]
+    given: GivenStart
     gated_below: float  # trace of the attitude covariance [rad^2]
     restart_after: float  # [s]
     longest_step: float  # [s]
@@ -83,6 +109,7 @@ class AttitudeParameters(NamedTuple):
 
 def parameters(values: Values) -> AttitudeParameters:
     """Parameters from checked values (`PARAMETERS`, `flight_references.PARAMETERS` and the mission's `cells`)."""
+    s1, s2, s3 = values.start.sigma_bn
     return AttitudeParameters(
         by_voltage=values.sun_model == "voltage",
         cells=CellModel(
@@ -101,6 +128,11 @@ def parameters(values: Values) -> AttitudeParameters:
         bias_variance=math.radians(values.gyro.bias_sigma_deg_s) ** 2,
         gyro_limit=math.radians(values.gyro.limit_deg_s),
         noise_without_gyro=math.radians(values.walk_without_gyro_deg) ** 2,
+        given=GivenStart(
+            values.start.attitude == "given",
+            mrp_shadow((float(s1), float(s2), float(s3))),
+            math.radians(values.start.sigma_deg) ** 2,
+        ),
         gated_below=math.radians(values.nis_gate_below_deg) ** 2,
         restart_after=values.restart_after,
         longest_step=values.longest_step,

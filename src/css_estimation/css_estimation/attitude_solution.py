@@ -41,7 +41,7 @@ class AttitudeState(NamedTuple):
     gyro_b: Vec3  # [rad/s] last reading
     gyro_known: bool  # and whether it was one
     age: float  # [s]
-    contradicted: float  # [s] for how long most measurements have been refused
+    contradicted: float  # [s] for how long the field or the Sun has been refused
 
 
 class AttitudeMemory(NamedTuple):
@@ -72,8 +72,9 @@ class AttitudeSolution(NamedTuple):
 
 
 def initial_state(p: AttitudeParameters) -> AttitudeState:
-    """Nothing known."""
-    return AttitudeState(False, False, _ZERO, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0)
+    """Nothing known, or the given attitude."""
+    given = p.given.is_given
+    return AttitudeState(given, given, p.given.sigma_bn if given else _ZERO, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0)
 
 
 def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
@@ -81,6 +82,9 @@ def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
     cells = len(p.cells.layout.cells)
     largest = largest_variances(p)
     covariance = np.diag(np.full(len(largest), LOST_VARIANCE))
+    if p.given.is_given:
+        for i in range(3):
+            covariance[i, i] = p.given.variance
     for i in range(3, CALIBRATION):
         covariance[i, i] = p.bias_variance
     c = p.cells.calibration

@@ -46,7 +46,9 @@ def _dark_cells_agree(cells, outputs, mask: int, sun_b: Vec3, least: float) -> b
 
 
 @kernel
-def chosen_sun(cells, outputs, mask: int, sun: LitSun, cosine: float, direction_b: Vec3, cell_sigma: float, gate: float):
+def chosen_sun(
+    cells, outputs, mask: int, sun: LitSun, cosine: float, direction_b: Vec3, cell_sigma: float, gate: float
+) -> tuple[Vec3, float, bool]:
     """Sun, its error [rad] about the worse axis across it, and whether there is one.
 
     Args:

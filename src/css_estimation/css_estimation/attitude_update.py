@@ -15,7 +15,12 @@ from css_estimation.attitude_start import Start, chosen_sun, no_start, start
 from css_estimation.cell_calibration import SCALE
 from css_estimation.cell_layout import READABLE, brightest
 from css_estimation.cell_voltages import cell_measurement
-from css_estimation.direction_measurement import DirectionMeasurement, normalised_innovation, update_direction
+from css_estimation.direction_measurement import (
+    DirectionMeasurement,
+    normalised_innovation,
+    update_direction,
+    widened,
+)
 from css_estimation.error_covariance import (
     ATTITUDE,
     BIAS,
@@ -24,6 +29,7 @@ from css_estimation.error_covariance import (
     attitude_block,
     begin_update,
     innovate,
+    neglected_variance,
     update,
 )
 from css_estimation.field_direction import field_measurement
@@ -43,8 +49,8 @@ class Tally(NamedTuple):
     """What a cycle's measurements came to."""
 
     nis: float  # of what was taken
-    offered: int  # degrees of freedom
-    taken: int
+    taken: int  # degrees of freedom
+    refused: bool  # the field, or most of what the Sun gives, was refused
     lit_mask: int  # cells that contributed
     used: int  # USED_*
 
@@ -61,10 +67,11 @@ def measure(
     light,
 ) -> tuple[AttitudeState, Tally]:
     """State after the measurements of one cycle, arguments as of `attitude_ekf.step`."""
-    tally = Tally(0.0, 0, 0, 0, 0)
+    tally = Tally(0.0, 0, False, 0, 0)
     if field_ok:
         predicted_b = multiply(mrp_to_dcm(state.sigma_bn), references.field_n)
         m = field_measurement(field_b, predicted_b, p.field_variance)
+        m = widened(m, neglected_variance(memory.covariance), 1.0)
         state, tally = _take_direction(p, state, memory, m, tally, USED_FIELD, 0)
     if references.sunlit:
         dcm_bn = mrp_to_dcm(state.sigma_bn)
@@ -77,6 +84,7 @@ def measure(
             else:
                 sun = lit_sun(p.cells.layout.cells, memory.outputs, mask, top)
                 m = sun_vector_measurement(sun, sun_b, p.cells.variance / references.intensity**2)
+                m = widened(m, neglected_variance(memory.covariance), sun.information[0])
                 state, tally = _take_direction(p, state, memory, m, tally, USED_SUN, mask)
     return state, tally
 
@@ -149,10 +157,13 @@ def _take_direction(p, state, memory, m: DirectionMeasurement, tally: Tally, sou
     nis = normalised_innovation(memory.covariance, m)
     taken = nis <= _GATES[m.dof - 1] or (nis < math.inf and not _is_converged(p, memory))
     if not taken:
-        return state, Tally(tally.nis, tally.offered + m.dof, tally.taken, tally.lit_mask, tally.used)
-    update_direction(memory.covariance, memory.work, m)
-    return _corrected(p, state, memory), Tally(
-        tally.nis + nis, tally.offered + m.dof, tally.taken + m.dof, tally.lit_mask | mask, tally.used | source
+        return state, Tally(tally.nis, tally.taken, True, tally.lit_mask, tally.used)
+    calibrates = p.cells.calibration.estimated
+    update_direction(memory.covariance, memory.work, m, memory.covariance.shape[0] if calibrates else CALIBRATION)
+    state = _corrected(p, state, memory)
+    cell_calibration.correct(p.cells.calibration, memory.calibration, memory.work[CORRECTION])
+    return state, Tally(
+        tally.nis + nis, tally.taken + m.dof, tally.refused, tally.lit_mask | mask, tally.used | source
     )
 
 
@@ -161,6 +172,7 @@ def _take_cells(p, state, memory, voltages, lit_mask: int, sun_b: Vec3, intensit
     c = p.cells.calibration
     covariance, work = memory.covariance, memory.work
     converged = _is_converged(p, memory)
+    neglected = neglected_variance(covariance) * intensity * intensity
     nis, offered, count, mask = 0.0, 0, 0, 0
     begin_update(work)
     for i in range(voltages.shape[0]):
@@ -173,7 +185,7 @@ def _take_cells(p, state, memory, voltages, lit_mask: int, sun_b: Vec3, intensit
         if not m.used:
             continue
         offered += 1
-        innovation, s = innovate(covariance, work, m.partials, m.residual, m.variance)
+        innovation, s = innovate(covariance, work, m.partials, m.residual, m.variance + neglected)
         q = innovation * innovation / s
         if not q < math.inf or (converged and q > _GATES[0]):
             continue
@@ -186,7 +198,8 @@ def _take_cells(p, state, memory, voltages, lit_mask: int, sun_b: Vec3, intensit
         state = _corrected(p, state, memory)
         cell_calibration.correct(c, memory.calibration, work[CORRECTION])
     used = tally.used | USED_SUN if count > 0 else tally.used
-    return state, Tally(tally.nis + nis, tally.offered + offered, tally.taken + count, tally.lit_mask | mask, used)
+    refused = tally.refused or 2 * count < offered
+    return state, Tally(tally.nis + nis, tally.taken + count, refused, tally.lit_mask | mask, used)
 
 
 @kernel

@@ -27,6 +27,12 @@ def no_direction() -> DirectionMeasurement:
 
 
 @kernel
+def widened(m: DirectionMeasurement, variance: float, largest: float) -> DirectionMeasurement:
+    """The measurement with a further error of `variance` in its direction, whose rows are weighted by `largest`."""
+    return DirectionMeasurement(m.rows, m.residual, m.variance + variance * largest, m.dof)
+
+
+@kernel
 def normalised_innovation(covariance, m: DirectionMeasurement) -> float:
     """Normalised innovation squared of the whole direction, chi-square with `m.dof` degrees of freedom."""
     s: Symmetric = congruence(m.rows, attitude_block(covariance))
@@ -36,10 +42,10 @@ def normalised_innovation(covariance, m: DirectionMeasurement) -> float:
 
 
 @kernel
-def update_direction(covariance, work, m: DirectionMeasurement) -> None:
-    """Covariance and correction after a direction."""
+def update_direction(covariance, work, m: DirectionMeasurement, estimated: int) -> None:
+    """Covariance and correction after a direction; errors from index `estimated` on are considered."""
     begin_update(work)
     for k in range(m.dof):
         h = Partials(m.rows[k], 0, 0, _ZERO)
         innovation, s = innovate(covariance, work, h, m.residual[k], m.variance)
-        update(covariance, work, innovation, s, covariance.shape[0])
+        update(covariance, work, innovation, s, estimated)

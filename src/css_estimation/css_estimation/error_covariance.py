@@ -28,7 +28,7 @@ class Partials(NamedTuple):
 
     attitude: Vec3
     first: int  # index of the first calibration error; 0: none
-    count: int  # calibration errors that follow from there, at most 3
+    errors: int  # calibration errors that follow from there, at most 3
     calibration: Vec3
 
 
@@ -42,6 +42,19 @@ def attitude_block(covariance) -> Symmetric:
     """Covariance of the attitude error [rad^2]."""
     p = covariance
     return (p[0, 0], p[0, 1], p[0, 2], p[1, 1], p[1, 2], p[2, 2])
+
+
+@kernel
+def neglected_variance(covariance) -> float:
+    """Variance of what the linear model of a direction leaves out, of second order in the attitude error.
+
+    A unit vector turned by dtheta differs from its linear prediction by dtheta x (dtheta x s) / 2, of mean square
+    between sigma^4 / 4 across s and 2 sigma^4 along it for an error of sigma about each axis; here sigma^4, as in a
+    second-order filter (Bar-Shalom, Li & Kirubarajan, section 10.3). It keeps a filter that begins far off from
+    believing that its first update has brought it close, and vanishes as it converges.
+    """
+    mean = (covariance[0, 0] + covariance[1, 1] + covariance[2, 2]) / 3.0
+    return mean * mean
 
 
 @kernel
@@ -91,14 +104,14 @@ def innovate(covariance, work, h: Partials, residual: float, variance: float) ->
     p, n = covariance, covariance.shape[0]
     for i in range(n):
         total = p[i, 0] * h.attitude[0] + p[i, 1] * h.attitude[1] + p[i, 2] * h.attitude[2]
-        for k in range(h.count):
+        for k in range(h.errors):
             total += p[i, h.first + k] * h.calibration[k]
         work[_PRODUCT, i] = total
     innovation, s = residual, variance
     for i in range(3):
         innovation -= h.attitude[i] * work[CORRECTION, i]
         s += h.attitude[i] * work[_PRODUCT, i]
-    for k in range(h.count):
+    for k in range(h.errors):
         innovation -= h.calibration[k] * work[CORRECTION, h.first + k]
         s += h.calibration[k] * work[_PRODUCT, h.first + k]
     return innovation, s

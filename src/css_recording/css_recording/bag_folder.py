@@ -30,7 +30,7 @@ def prepare_folder(folder: Path, overwrite: bool) -> None:
         if not contents:
             return
         if not overwrite:
-            raise BagError(f"{folder}: already exists and is not empty; choose another name or overwrite it")
+            raise BagError(f"{folder}: already exists and is not empty; choose another name, or --overwrite it")
         foreign = [path.name for path in contents if not _belongs_to_bag(path)]
         if foreign:
             raise BagError(f"{folder}: holds {foreign[0]}, which is no part of a recording; not overwritten")

@@ -2,6 +2,7 @@
 """Where the messages of a recording come from: MCAP files, read here, or anything else `rosbags` can read."""
 
 import heapq
+import os
 from collections.abc import Iterator
 from operator import itemgetter
 from pathlib import Path
@@ -69,9 +70,8 @@ def open_storage(path: Path) -> BagStorage:
 
 def unfinished(path: Path, reason: str) -> BagError:
     """The error for a recording whose recorder did not close it."""
-    return BagError(
-        f"{path}: the recording is unfinished: {reason}; mend it with `ros2 run css_recording recover {path}`"
-    )
+    recover = "./sunpoint recover" if os.environ.get("SUNPOINT_HOME") else "ros2 run css_recording recover"
+    return BagError(f"{path}: the recording is unfinished: {reason}; mend it with `{recover} {path}`")
 
 
 def topic_of(file: McapFile, channel_id: int) -> Topic:

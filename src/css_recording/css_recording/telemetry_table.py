@@ -198,7 +198,7 @@ def _stamp(text: str, column: str, epoch_ns: int | None) -> int:
             raise _Broken("no time", f"column {column}: {text!r} found, {expected}")
         if epoch_ns is None and seconds < _UNIX_ERA:
             raise _Broken(
-                "no epoch", f"column {column}: {text} s is not a time since 1970; name the epoch from which it counts"
+                "no epoch", f"column {column}: {text} s is not a time since 1970; --epoch names its beginning"
             )
         stamp_ns = (epoch_ns or 0) + round(seconds * 1_000_000_000)
     if not 0 < stamp_ns < _LAST_NS:

@@ -186,12 +186,16 @@ def test_other_encodings_of_channels_are_refused(flight, tmp_path):
         BagReader(path)
 
 
-def test_unfinished_recordings_name_the_command_that_mends_them(flight, tmp_path):
+def test_unfinished_recordings_name_the_command_that_mends_them(flight, tmp_path, monkeypatch):
     folder = flight.record(tmp_path / "bag", STEPS)
     file = folder / "bag_0.mcap"
     whole = file.read_bytes()
     (folder / "metadata.yaml").unlink()
-    with pytest.raises(BagError, match=rf"unfinished.*recover {folder}"):
+    monkeypatch.delenv("SUNPOINT_HOME", raising=False)
+    with pytest.raises(BagError, match=rf"unfinished.*`ros2 run css_recording recover {folder}`"):
+        BagReader(folder)
+    monkeypatch.setenv("SUNPOINT_HOME", str(tmp_path))
+    with pytest.raises(BagError, match=rf"unfinished.*`\./sunpoint recover {folder}`"):
         BagReader(folder)
     file.write_bytes(whole[:-100])
     with pytest.raises(BagError, match=rf"unfinished.*recover {file}"):

@@ -139,7 +139,7 @@ GOOD = "1370000000,1,1,0,0,0,1,0,0\n"
         ("nan,1,1,0,0,0,1,0,0", "column time: 'nan' found", "no time"),
         ("1e400,1,1,0,0,0,1,0,0", "column time: '1e400' found", "no time"),
         ("9999999999,1,1,0,0,0,1,0,0", "outside of 1970 to 2038", "no time"),
-        ("12.5,1,1,0,0,0,1,0,0", "12.5 s is not a time since 1970; name the epoch", "no epoch"),
+        ("12.5,1,1,0,0,0,1,0,0", "12.5 s is not a time since 1970; --epoch names its beginning", "no epoch"),
         ("1370000000,1,1,0,0,0,1,0,0", "column time: 1370000000 is not after the line before", "does not go forward"),
         ("1369999999,1,1,0,0,0,1,0,0", "is not after the line before", "does not go forward"),
         ("1370000001,1,high,0,0,0,1,0,0", "column c2: 'high' found, expected a number", "no number"),

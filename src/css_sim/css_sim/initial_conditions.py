@@ -59,7 +59,8 @@ def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
     given, wheels = len(values.initial.wheel_speed_rpm), len(wheel_axes(values))
     if given not in ((0, 1, wheels) if wheels else (0,)):
-        yield f"initial.wheel_speed_rpm: {given} values given, expected {f'none, 1 or {wheels}' if wheels else 'none without wheels'}"
+        expected = f"none, 1 or {wheels}" if wheels else "none without wheels"
+        yield f"initial.wheel_speed_rpm: {given} values given, expected {expected}"
     fastest = np.max(np.abs(values.initial.wheel_speed_rpm), initial=0.0)
     if fastest > values.wheels.max_speed_rpm:
         yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"

@@ -2,7 +2,7 @@
 """Flights in one process: the order of calls, scripted changes, and the figures of O'Keefe & Schaub 2013.
 
 The paper's figures are means over 1000 cases; here a few cases of the first ten minutes, which are sunlit, and one
-case through the eclipse. `benchmarks/okeefe_cases.py` flies more of them.
+case through the eclipse. `./sunpoint reproduce okeefe` flies all of them.
 """
 
 import numpy as np

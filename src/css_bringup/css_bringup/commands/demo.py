@@ -58,7 +58,7 @@ def _run(arguments: argparse.Namespace) -> int:
         f"nodes {', '.join(node.name for node in mission.nodes)}",
         soft_wrap=True,
     )
-    flight = fly(mission, bag, processes=False, console=console)
+    flight = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite)
     if flight.interrupted:
         errors.print(f"interrupted; the recording up to here is complete: {bag}", soft_wrap=True)
         return INTERRUPTED
@@ -69,7 +69,8 @@ def _run(arguments: argparse.Namespace) -> int:
     flown = estimator_runs(log, [mission.values.graph.estimator])
     print_result(console, flight, flown)
     console.print("\nReplaying the recording through every Sun estimator, with gyro and without:")
-    replayed = replay(bag, bag.with_name(f"{bag.name}_replay"), mission, map(parse_request, _REPLAYED), {})
+    copy = bag.with_name(f"{bag.name}_replay")
+    replayed = replay(bag, copy, mission, map(parse_request, _REPLAYED), {}, overwrite=arguments.overwrite)
     print_replay(replayed)
     folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
     print_figures(log, folder)

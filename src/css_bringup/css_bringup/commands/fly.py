@@ -50,7 +50,7 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
-    result = fly(mission, bag, processes=arguments.processes, console=console)
+    result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
     return conclude(mission, result, as_json=arguments.json)
 
 

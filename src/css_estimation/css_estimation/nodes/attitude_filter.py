@@ -43,7 +43,7 @@ class AttitudeFilter(Component):
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         if values.calibration.mode != "off" and values.sun_model == "vector":
-            yield f"calibration.mode: {values.calibration.mode} given, but cells are calibrated by sun_model voltage alone"
+            yield f"calibration.mode: {values.calibration.mode} given, but sun_model vector calibrates no cells"
 
     def configure(self) -> None:
         self._parameters = attitude_options.parameters(self.values)
@@ -58,7 +58,7 @@ class AttitudeFilter(Component):
         self._parameters = attitude_options.parameters(values)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input

@@ -9,11 +9,12 @@ import rclpy
 from rclpy.signals import SignalHandlerOptions
 
 from css_common.executor import create_executor
+from css_common.stop_signal import StopSignal
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
 from css_recording.player import PlayerNode
-from css_recording.process import StopSignal, split_arguments
+from css_recording.process import split_arguments
 
 _DESCRIPTION = """\
 Publish a recording to live nodes. Topics that a live node publishes are left to it. With --wait-for the playback is

@@ -16,9 +16,10 @@ from rclpy.signals import SignalHandlerOptions
 from css_common.executor import create_executor, spin_until
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
+from css_common.stop_signal import StopSignal
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
-from css_recording.process import StopSignal, split_arguments
+from css_recording.process import split_arguments
 from css_recording.recorder import RecorderNode
 
 _DESCRIPTION = """\

@@ -52,10 +52,15 @@ def row(
     return Row(quantity, unit, paper, here, must, (must or Must()).admits(here), **rest)
 
 
+def full_name(line: Row) -> str:
+    """The quantity with its variant behind it."""
+    return f"{line.quantity}, {line.variant}" if line.variant else line.quantity
+
+
 def row_object(line: Row) -> dict[str, Any]:
     """A row as plain data; the variant stands behind the quantity."""
     return {
-        "quantity": f"{line.quantity}, {line.variant}" if line.variant else line.quantity,
+        "quantity": full_name(line),
         "unit": line.unit,
         "paper": line.paper,
         "here": line.here,
@@ -110,5 +115,5 @@ def notes_of(rows: Iterable[Row]) -> list[str]:
     by_note: dict[str, list[str]] = {}
     for line in rows:
         if line.note:
-            by_note.setdefault(line.note, []).append(line.quantity)
+            by_note.setdefault(line.note, []).append(full_name(line))
     return [f"{'; '.join(dict.fromkeys(quantities))}: {note}" for note, quantities in by_note.items()]

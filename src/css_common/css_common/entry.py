@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`main` of every installed executable: finds its module and keeps Ctrl-C and closed pipes from printing tracebacks.
+
+Nothing is imported here but the standard library, because what comes before the first line of a module cannot be
+guarded.
+"""
+
+import importlib
+import importlib.util
+import os
+import signal
+import sys
+from pathlib import Path
+
+_INTERRUPTED = 130
+
+
+def main() -> int:
+    """Runs `main` of PACKAGE/nodes/NAME.py or PACKAGE/commands/NAME.py, started as lib/PACKAGE/NAME; its exit code."""
+    interrupt = signal.getsignal(signal.SIGINT)
+    if interrupt is signal.default_int_handler:
+        # Libraries take an exception in the middle of their import badly: until they are there Ctrl-C just ends.
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    run = _module(Path(sys.argv[0])).main
+    signal.signal(signal.SIGINT, interrupt)
+    try:
+        return _with_pipe(run)
+    except KeyboardInterrupt:
+        return _INTERRUPTED
+
+
+def _module(executable: Path):
+    package, name = executable.parent.name, executable.name
+    for folder in ("nodes", "commands"):
+        module = f"{package}.{folder}.{name}"
+        if importlib.util.find_spec(f"{package}.{folder}") and importlib.util.find_spec(module):
+            return importlib.import_module(module)
+    raise SystemExit(f"{executable}: there is no {package}/nodes/{name}.py or {package}/commands/{name}.py")
+
+
+def _with_pipe(run) -> int:
+    """Runs and writes out what was printed; that nobody reads it to its end (`| head`) is no failure."""
+    try:
+        try:
+            return run()
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        # else Python would try again at its end, and say so
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
