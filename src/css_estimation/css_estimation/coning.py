@@ -175,10 +175,7 @@ def _mean_motion(
     """Mean over equal segments of the window."""
     start, end = passages.time[0], passages.time[-1]
     edges = np.linspace(start, np.nextafter(end, np.inf), max(1, round((end - start) / SEGMENT)) + 1)
-    fits = [
-        _motion(passages.between(a, b), inclination, candidate, spin, full_angle)
-        for a, b in pairwise(edges)
-    ]
+    fits = [_motion(passages.between(a, b), inclination, candidate, spin, full_angle) for a, b in pairwise(edges)]
     rows = np.array([fit for fit in fits if fit is not None])
     if not len(rows):
         return None

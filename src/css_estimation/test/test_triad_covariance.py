@@ -88,7 +88,9 @@ def test_the_order_that_leaves_less_is_taken_when_either_may_be_first():
 def test_a_field_along_the_sun_or_none_gives_no_attitude():
     sun = (1.0, 0.0, 0.0)
     for field in ((5e-5, 1e-6, 0.0), (0.0, 0.0, 0.0)):
-        assert sun_field_attitude(sun, isotropic(1e-6), field, 1e-14, sun, (5e-5, 1e-6, 0.0), ORDER_BEST).mode == MODE_NONE
+        assert (
+            sun_field_attitude(sun, isotropic(1e-6), field, 1e-14, sun, (5e-5, 1e-6, 0.0), ORDER_BEST).mode == MODE_NONE
+        )
 
 
 @given(st.floats(0.0, 1.0), st.floats(0.0, 6.3), st.floats(0.01, 0.5))

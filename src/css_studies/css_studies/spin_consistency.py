@@ -79,9 +79,7 @@ def _watched(
     times, slits, heads = np.zeros(room), np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
     count = slit_crossings(motion, slit_geometry(values), sun_n, end - WATCHED, end, times, slits, heads)
     ticks, codes = np.zeros(2 * room, dtype=np.int64), np.zeros((2 * room, 2), dtype=np.int64)
-    pulses = slit_timer.read_pulses(
-        slit_timer.parameters(values), key, 0, count, times, slits, heads, ticks, codes
-    )
+    pulses = slit_timer.read_pulses(slit_timer.parameters(values), key, 0, count, times, slits, heads, ticks, codes)
     read_out = zip(ticks[:pulses].tolist(), codes[:pulses].tolist(), strict=True)
     given = [(slit, tick % slit_timer.WRAP, head) for tick, (slit, head) in read_out]
     return read_record(slit_measurement.parameters(estimator), given, azimuths.tolist())

@@ -9,7 +9,18 @@ import numpy as np
 from css_estimation.coning import Coning, Passages
 from css_estimation.coning_angle import extremum_differences
 from css_estimation.coning_spectrum import fourier_spectrum, sampling_rate
-from css_studies.figure_style import BLUE, DARK_GREY, GREY, VERMILION, colours, legend, level_line, new_figure, save, style
+from css_studies.figure_style import (
+    BLUE,
+    DARK_GREY,
+    GREY,
+    VERMILION,
+    colours,
+    legend,
+    level_line,
+    new_figure,
+    save,
+    style,
+)
 
 Event = tuple[float, str]
 """Time [s] and what happened."""

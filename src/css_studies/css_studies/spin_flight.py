@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A flight of a spinning payload as its estimators saw it: passages, attitudes and coning, from topics or a recording."""
+"""A flight of a spinning payload as its estimators saw it: passages, attitudes, coning; from topics or a recording."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence

@@ -95,5 +95,7 @@ def test_attitude_errors_are_those_that_their_covariance_says_over_500_cases():
 
 def test_attitude_error_is_the_rotation_between_attitudes():
     angle = 0.02
-    turn = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(angle), math.sin(angle)], [0.0, -math.sin(angle), math.cos(angle)]])
+    turn = np.array(
+        [[1.0, 0.0, 0.0], [0.0, math.cos(angle), math.sin(angle)], [0.0, -math.sin(angle), math.cos(angle)]]
+    )
     np.testing.assert_allclose(attitude_error(np.eye(3), turn), [angle, 0.0, 0.0], atol=1e-5)

@@ -60,7 +60,10 @@ def test_windows_are_analysed_one_by_one(pulse_file, capsys):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("slit,count\nupper,12\nlower,1.5\n", "line 3: count '1.5' given, expected a whole number from 0 to 4294967295"),
+        (
+            "slit,count\nupper,12\nlower,1.5\n",
+            "line 3: count '1.5' given, expected a whole number from 0 to 4294967295",
+        ),
         ("slit,count\nupper,12\nleft,15\n", "line 3: slit 'left' given, expected upper, vertical or lower"),
         ("slit,count\n\n# note\nupper\n", "line 4: 1 values given, expected 2"),
         ("slit,ticks\nupper,12\n", "line 1: no column 'count'"),

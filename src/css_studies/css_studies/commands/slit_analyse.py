@@ -57,7 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         values = _values(options)
         record = _record(options, values)
         if not len(record.passages.time):
-            print(f"slit_analyse: {options.file}: no passage in {record.pulses} pulses: {_refusals(record)}", file=sys.stderr)
+            print(
+                f"slit_analyse: {options.file}: no passage in {record.pulses} pulses: {_refusals(record)}",
+                file=sys.stderr,
+            )
             return FAILED
         windows = _windows(options, values, record)
         result = _result_object(record, windows)

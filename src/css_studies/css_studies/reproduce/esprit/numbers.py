@@ -47,7 +47,14 @@ def angle_rows(legs: Legs, truth_max_min: float) -> list[Row]:
     read = math.degrees(0.5 * (legs.up.max_min_angle + legs.down.max_min_angle))
     return [
         row("coning full angle, fitted", "deg", FULL_ANGLE, fitted, Must(FULL_ANGLE - 0.3, FULL_ANGLE + 0.3), digits=4),
-        row("coning full angle, maxima less minima", "deg", FULL_ANGLE, read, note=bias_note(legs.up, truth_max_min), digits=4),
+        row(
+            "coning full angle, maxima less minima",
+            "deg",
+            FULL_ANGLE,
+            read,
+            note=bias_note(legs.up, truth_max_min),
+            digits=4,
+        ),
     ]
 
 
@@ -69,7 +76,9 @@ def bias_note(coning: Coning, truth_max_min: float) -> str:
 def true_max_min(mission: Mission, coning: Coning, passages: Passages) -> float:
     """What maxima less minima [rad] make of perfect Sun angles at the instants of a window."""
     sensor = mission.node("slit_sensor").values
-    motion = payload_motion(sensor, mission.epoch_ns, random_key(mission.values.mission.seed, mission.values.mission.case))
+    motion = payload_motion(
+        sensor, mission.epoch_ns, random_key(mission.values.mission.seed, mission.values.mission.case)
+    )
     part = passages.between(coning.start, np.nextafter(coning.end, np.inf))
     sun_n = sun_direction(mission)
     angles = [math.asin(float(np.array(payload_state(motion, t).dcm_bn)[2] @ sun_n)) for t in part.time.tolist()]
@@ -98,7 +107,9 @@ def period_rows(legs: Legs, drifting: Legs) -> list[Row]:
             "phase (payload.final_coning_period) both of the paper's numbers come out"
         )
         rows.append(row("coning period up-leg, FFT", "s", UP_PERIOD, up, up_must, note=note, variant=variant, digits=4))
-        rows.append(row("coning period down-leg, FFT", "s", DOWN_PERIOD, down, down_must, note=note, variant=variant, digits=4))
+        rows.append(
+            row("coning period down-leg, FFT", "s", DOWN_PERIOD, down, down_must, note=note, variant=variant, digits=4)
+        )
     return rows
 
 

@@ -157,4 +157,6 @@ def _head_section(studies: dict[str, Coning], folder: Path) -> Section:
         "The paper proposes several sensors around the perimeter. Four leave one frequency alone, and their maxima "
         "and minima of the Sun angle come closer to the cone; two leave one other, and find no more extrema than one."
     )
-    return Section("Several heads", [text, Table(heading, lines), Picture(figure.name, "What each number leaves open.")])
+    return Section(
+        "Several heads", [text, Table(heading, lines), Picture(figure.name, "What each number leaves open.")]
+    )
