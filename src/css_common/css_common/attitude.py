@@ -160,3 +160,30 @@ def rotation_vector_to_dcm(phi: Vec3) -> Mat3:
         (b * x * y - a * z, 1.0 - b * (x * x + z * z), b * y * z + a * x),
         (b * x * z + a * y, b * y * z - a * x, 1.0 - b * (x * x + y * y)),
     )
+
+
+@kernel
+def rotation_vector_to_mrp(phi: Vec3) -> Vec3:
+    """MRP set with |sigma| <= 1 of the frame turned by the angle |phi| [rad] about phi, exact also for tiny angles."""
+    angle2 = dot(phi, phi)
+    if angle2 < 1e-8:
+        return scale(0.25 + angle2 / 192.0, phi)
+    angle = math.sqrt(angle2)
+    # whole turns are none
+    least = angle - 2.0 * math.pi * math.floor(0.5 * angle / math.pi + 0.5)
+    return scale(math.tan(0.25 * least) / angle, phi)
+
+
+@kernel
+def mrp_angle(sigma_bn: Vec3) -> float:
+    """Angle [rad], 0 to pi, of the rotation from n to b."""
+    s = math.sqrt(dot(sigma_bn, sigma_bn))
+    angle = 4.0 * math.atan(s)
+    return angle if angle <= math.pi else 2.0 * math.pi - angle
+
+
+@kernel
+def mrp_to_rotation_vector(sigma_bn: Vec3) -> Vec3:
+    """Rotation vector [rad], of length up to pi, of an MRP set with |sigma| <= 1."""
+    s = math.sqrt(dot(sigma_bn, sigma_bn))
+    return scale(4.0 * math.atan(s) / s if s > 1e-8 else 4.0, sigma_bn)

@@ -6,7 +6,7 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -55,6 +55,7 @@ class Output:
         frame: whose frame_id it carries, `BODY` or `INERTIAL`.
         divider: published every `divider` steps.
         ends_cycle: in lockstep the plant waits for it before it advances (estimates and commands).
+        events: any number of messages a step, stamped when they happened; nothing can wait for them or match them.
     """
 
     key: str
@@ -63,11 +64,23 @@ class Output:
     frame: str = BODY
     divider: int = 1
     ends_cycle: bool = False
+    events: bool = False
 
 
 Received = Mapping[str, Any]
 """Input key to `Sample`; None for an optional input that is silent and for one that is not due."""
-Outgoing = Mapping[str, Sample]
+Outgoing = Mapping[str, Sample | tuple[Sample, ...]]
+"""Output key to its message of the step, or to those of an output of events."""
+
+
+def messages_of(outgoing: Outgoing) -> Iterator[tuple[str, Sample]]:
+    """Each message that a component gave, with the key of its output."""
+    for key, given in outgoing.items():
+        if isinstance(given, tuple):
+            for sample in given:
+                yield key, sample
+        else:
+            yield key, given
 
 
 def _unheard(text: str) -> None:

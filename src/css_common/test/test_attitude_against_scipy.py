@@ -146,3 +146,15 @@ def test_compiled_and_plain_python_agree(a, b):
     assert_allclose(attitude.mrp_add(a, b), attitude.mrp_add.py_func(a, b), rtol=1e-13, atol=1e-15)
     assert_allclose(attitude.mrp_to_dcm(a), attitude.mrp_to_dcm.py_func(a), rtol=0.0, atol=1e-15)
     assert_allclose(attitude.mrp_rate(a, b), attitude.mrp_rate.py_func(a, b), rtol=1e-13, atol=1e-15)
+
+
+@given(vectors, st.floats(-12.0, 2.0))
+def test_rotation_vector_to_mrp_against_scipy(direction, exponent):
+    phi = scale(10.0**exponent, direction)
+    sigma = attitude.rotation_vector_to_mrp(phi)
+    assert np.linalg.norm(sigma) <= 1.0 + 1e-12
+    expected = Rotation.from_rotvec(phi)
+    assert_allclose(attitude.mrp_to_dcm(sigma), expected.as_matrix().T, atol=1e-12, rtol=0.0)
+    assert_allclose(attitude.mrp_angle(sigma), expected.magnitude(), atol=1e-11, rtol=1e-9)
+    again = Rotation.from_rotvec(attitude.mrp_to_rotation_vector(sigma))
+    assert (again * expected.inv()).magnitude() < 1e-11

@@ -16,7 +16,7 @@ from css_common.vectors import Mat3, Vec3, norm, scale, subtract
 from css_environment.constants import ASTRONOMICAL_UNIT
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.eclipse import conical_illumination, cylindrical_illumination
-from css_environment.magnetic_field import field_along_orbit
+from css_environment.magnetic_field import HIGHEST_DEGREE, field_along_orbit
 from css_environment.orbit import Orbit, orbit_states
 from css_environment.sun import sun_positions
 
@@ -67,6 +67,7 @@ def build_ephemeris(
     field: bool = True,
     conical_shadow: bool = True,
     step_s: float = KNOT_STEP_S,
+    field_degree: int = HIGHEST_DEGREE,
 ) -> Ephemeris:
     """Tables from `start_s` to at least `start_s + span_s` [s after the epoch (UTC, ns)].
 
@@ -83,7 +84,7 @@ def build_ephemeris(
         wide = start_s + step_s * np.arange(-2, intervals + 3)
         wide_r_n, _ = orbit_states(orbit, epoch_ns, wide)
         date_ns = epoch_ns + int(start_s * 1e9)
-        f = field_along_orbit(wide_r_n, wide - start_s, dcm_en, date_ns)
+        f = field_along_orbit(wide_r_n, wide - start_s, dcm_en, date_ns, field_degree)
         field_n = np.ascontiguousarray(f[2:-2])
         field_rate_n = (f[:-4] - 8.0 * f[1:-3] + 8.0 * f[3:-1] - f[4:]) / (12.0 * step_s)
     return Ephemeris(

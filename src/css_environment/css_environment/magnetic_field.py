@@ -7,12 +7,18 @@ import numpy as np
 
 from css_environment.constants import EARTH_ROTATION_RATE
 
+HIGHEST_DEGREE = 13
+"""Of the spherical harmonics of IGRF."""
 
-def field_along_orbit(r_n: np.ndarray, elapsed_s: np.ndarray, dcm_en, date_ns: int) -> np.ndarray:
+
+def field_along_orbit(
+    r_n: np.ndarray, elapsed_s: np.ndarray, dcm_en, date_ns: int, degree: int = HIGHEST_DEGREE
+) -> np.ndarray:
     """Field in n [T], (T, 3), at positions `r_n` [m], (T, 3).
 
     `dcm_en` is the rotation from n to e at elapsed time zero, from where the Earth turns with `elapsed_s`;
     `date_ns` (UTC, ns) fixes the secular variation, which is about 100 nT a year: one date does for a day.
+    Harmonics beyond `degree` are left out, as a small flight computer may.
     """
     import ppigrf  # here: it loads pandas, which missions without a magnetometer need not wait for
 
@@ -29,6 +35,7 @@ def field_along_orbit(r_n: np.ndarray, elapsed_s: np.ndarray, dcm_en, date_ns: i
         np.degrees(colatitude),
         np.degrees(longitude),
         datetime.fromtimestamp(date_ns / 1e9, tz=UTC).replace(tzinfo=None),
+        max_degree=degree,
     )
     up, south, east = np.ravel(up), np.ravel(south), np.ravel(east)
     outward = up * np.sin(colatitude) + south * np.cos(colatitude)

@@ -51,6 +51,13 @@ def constant_reflectivity(value: float) -> Reflectivity:
     return Reflectivity(np.full((1, 1), float(value)), np.zeros((1, 1)))
 
 
+def named_reflectivity(name: str, constant: float, epoch_ns: int) -> Reflectivity:
+    """The built-in model `zonal` (of one column), `knocke` at an epoch (UTC, ns), or `constant` everywhere."""
+    if name == "zonal":
+        return zonal_reflectivity(1)
+    return knocke_reflectivity(epoch_ns) if name == "knocke" else constant_reflectivity(constant)
+
+
 def knocke_reflectivity(epoch_ns: int, rows: int = 36) -> Reflectivity:
     """Seasonal zonal model of Knocke, Ries & Tapley 1988 (also ECSS-E-ST-10-04C, annex F) at an epoch (UTC, ns)."""
     days, fraction = utc_date(epoch_ns)

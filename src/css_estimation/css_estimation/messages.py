@@ -5,11 +5,16 @@ from typing import Any
 
 import numpy as np
 
+from css_common.attitude import mrp_to_quaternion
 from css_common.codec import Sample
+from css_common.kernel import typed_call
 from css_common.vectors import Vec3, vector_of
+from css_estimation.attitude_solution import VALIDITY_NONE, AttitudeSolution
+from css_estimation.error_covariance import CALIBRATION
 from css_estimation.sun_heading import SunHeading
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
+_to_quaternion = typed_call(mrp_to_quaternion)
 
 
 def sun_estimate_fields(heading: SunHeading) -> dict[str, Any]:
@@ -44,3 +49,26 @@ def field_reading(field: Sample | None) -> tuple[Vec3, bool]:
     if field is None or field.magnetic_field_covariance[0] == -1.0:
         return _NOTHING, False
     return vector_of(field.magnetic_field), True
+
+
+def attitude_estimate_fields(solution: AttitudeSolution, covariance: np.ndarray) -> dict[str, Any]:
+    """Fields of css_msgs/AttitudeEstimate, without the header; of the covariance (n, n) attitude and bias."""
+    if solution.validity == VALIDITY_NONE:
+        quaternion, reported = np.zeros(4), np.zeros(36)
+        reported[0] = -1.0
+    else:
+        quaternion = np.array(_to_quaternion(solution.sigma_bn))
+        reported = covariance[:CALIBRATION, :CALIBRATION].ravel()
+    return {
+        "q_bn": quaternion,
+        "omega_bn_b": np.array(solution.omega_bn_b),
+        "gyro_bias_b": np.array(solution.bias_b),
+        "covariance": reported,
+        "age": solution.age,
+        "nis": solution.nis,
+        "lit_mask": solution.lit_mask,
+        "nis_dof": solution.nis_dof,
+        "validity": solution.validity,
+        "used": solution.used,
+        "mode": solution.mode,
+    }

@@ -135,3 +135,24 @@ def eigen(p: Symmetric) -> tuple[Vec3, Mat3]:
     if xx < yy:
         xx, yy, u, v = yy, xx, v, u
     return (xx, yy, zz), (u, v, w)
+
+
+@kernel
+def inverse_form(p: Symmetric, v: Vec3) -> float:
+    """v^T P^-1 v of a positive definite P, by its Cholesky factor; infinite when P is not."""
+    if not p[0] > 0.0:
+        return math.inf
+    l11 = math.sqrt(p[0])
+    l21, l31 = p[1] / l11, p[2] / l11
+    d22 = p[3] - l21 * l21
+    if not d22 > 0.0:
+        return math.inf
+    l22 = math.sqrt(d22)
+    l32 = (p[4] - l31 * l21) / l22
+    d33 = p[5] - l31 * l31 - l32 * l32
+    if not d33 > 0.0:
+        return math.inf
+    y1 = v[0] / l11
+    y2 = (v[1] - l21 * y1) / l22
+    y3 = v[2] - l31 * y1 - l32 * y2
+    return y1 * y1 + y2 * y2 + y3 * y3 / d33

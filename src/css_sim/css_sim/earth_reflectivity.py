@@ -9,9 +9,8 @@ from css_common.random_streams import RandomKey
 from css_common.schema import Table, Values, choice, flag, real, text
 from css_environment.reflectivity import (
     Reflectivity,
-    constant_reflectivity,
     draw_reflectivity,
-    knocke_reflectivity,
+    named_reflectivity,
     read_reflectivity,
     zonal_reflectivity,
 )
@@ -51,13 +50,10 @@ def source(values: Values, epoch_ns: int) -> Reflectivity:
         ValueError: a file is missing or wrong.
     """
     albedo = values.albedo
-    if albedo.reflectivity == "zonal":
-        # columns matter only to independent draws
-        return zonal_reflectivity() if albedo.draw == "per_cell" else zonal_reflectivity(1)
-    if albedo.reflectivity == "knocke":
-        return knocke_reflectivity(epoch_ns)
-    if albedo.reflectivity == "constant":
-        return constant_reflectivity(albedo.constant)
+    if albedo.reflectivity == "zonal" and albedo.draw == "per_cell":
+        return zonal_reflectivity()  # columns matter only to independent draws
+    if albedo.reflectivity != "file":
+        return named_reflectivity(albedo.reflectivity, albedo.constant, epoch_ns)
     return read_reflectivity(albedo.mean_file, albedo.std_file or None)
 
 

@@ -14,6 +14,7 @@ from css_common.attitude import mrp_shadow, quaternion_to_mrp
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Table, Values, choice, real, reals
+from css_common.sections import wheel_axes
 from css_common.vectors import Vec3
 from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momentum_at_speed
 
@@ -56,9 +57,10 @@ def parameters(values: Values) -> InitialConditions:
 
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
-    given, wheels = len(values.initial.wheel_speed_rpm), len(values.wheels.axes)
-    if given not in (0, 1, wheels):
-        yield f"initial.wheel_speed_rpm: {given} values given, expected none, 1 or {wheels}"
+    given, wheels = len(values.initial.wheel_speed_rpm), len(wheel_axes(values))
+    if given not in ((0, 1, wheels) if wheels else (0,)):
+        expected = f"none, 1 or {wheels}" if wheels else "none without wheels"
+        yield f"initial.wheel_speed_rpm: {given} values given, expected {expected}"
     fastest = np.max(np.abs(values.initial.wheel_speed_rpm), initial=0.0)
     if fastest > values.wheels.max_speed_rpm:
         yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"
@@ -107,15 +109,16 @@ def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBo
     brought back to the nearest that one has.
     """
     inertia = np.asarray(values.spacecraft.inertia, dtype=np.float64)
-    torque = np.full(len(values.wheels.axes), values.wheels.max_torque)
+    axes = wheel_axes(values)
+    torque = np.full(len(axes), values.wheels.max_torque)
     if values.dispersion.inertia > 0.0:
-        moments, axes = np.linalg.eigh(inertia)
+        moments, principal = np.linalg.eigh(inertia)
         draws = np.array(normal4(key, Stream.INERTIA, 0, 0)[:3])
         moments = moments * np.clip(1.0 + values.dispersion.inertia * draws, 0.1, None)
         largest = int(np.argmax(moments))
         moments[largest] = min(moments[largest], np.sum(np.delete(moments, largest)))
-        inertia = (axes * moments) @ axes.T
+        inertia = (principal * moments) @ principal.T
     if values.dispersion.wheel_torque > 0.0:
         draws = np.array([normal4(key, Stream.WHEEL_LIMIT, 0, i)[0] for i in range(len(torque))])
         torque = torque * np.clip(1.0 + values.dispersion.wheel_torque * draws, 0.0, None)
-    return rigid_body(inertia, values.wheels.axes, values.wheels.inertia, torque, values.wheels.max_speed_rpm, substeps)
+    return rigid_body(inertia, axes, values.wheels.inertia, torque, values.wheels.max_speed_rpm, substeps)

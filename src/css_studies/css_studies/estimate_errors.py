@@ -3,17 +3,22 @@
 
 import numpy as np
 
+from css_common.attitude import mrp_angle, mrp_subtract, mrp_to_rotation_vector, quaternion_to_mrp
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, axes_across, dot, multiply, row, subtract
-from css_msgs.msg import SunEstimate
+from css_estimation.error_covariance import attitude_block
+from css_estimation.symmetric import inverse_form
+from css_msgs.msg import AttitudeEstimate, SunEstimate
 from css_studies.flight_log import FlightLog, angle
 
 
 def estimated_rows(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Rows (K,) of an estimator's columns that hold an estimate, and their steps (K,) of the truth."""
-    estimates = log.estimates[name]
+    is_attitude = name in log.attitudes
+    estimates = log.attitudes[name] if is_attitude else log.estimates[name]
     rows, steps = log.truth_rows(estimates)
-    exists = estimates.validity[rows] != SunEstimate.VALIDITY_NONE
+    none = AttitudeEstimate.VALIDITY_NONE if is_attitude else SunEstimate.VALIDITY_NONE
+    exists = estimates.validity[rows] != none
     return rows[exists], steps[exists]
 
 
@@ -65,3 +70,23 @@ def tangent_nees_of(sun_hat_b: Vec3, covariance, sun_b: Vec3) -> float:
 def _tangent_nees_of_rows(sun_hat_b, covariance, sun_b, nees_out) -> None:
     for i in range(nees_out.shape[0]):
         nees_out[i] = tangent_nees_of(row(sun_hat_b, i), covariance[i], row(sun_b, i))
+
+
+def attitude_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Steps of the truth (K,) that have an attitude, angles (K,) [rad] of the Euler rotation from the estimated to the
+    true attitude there, and normalised errors squared (K,), chi-square of three degrees of freedom if consistent."""
+    attitudes = log.attitudes[name]
+    rows, steps = estimated_rows(log, name)
+    errors, nees = np.empty(len(rows)), np.empty(len(rows))
+    covariance = attitudes.covariance[rows].reshape(-1, 6, 6)
+    _attitude_errors_of_rows(attitudes.q_bn[rows], covariance, log.having("truth").sigma_bn[steps], errors, nees)
+    return steps, errors, nees
+
+
+@kernel
+def _attitude_errors_of_rows(q_bn, covariance, sigma_bn, errors_out, nees_out) -> None:
+    for i in range(errors_out.shape[0]):
+        estimated = quaternion_to_mrp((q_bn[i, 0], q_bn[i, 1], q_bn[i, 2], q_bn[i, 3]))
+        difference = mrp_subtract(row(sigma_bn, i), estimated)
+        errors_out[i] = mrp_angle(difference)
+        nees_out[i] = inverse_form(attitude_block(covariance[i]), mrp_to_rotation_vector(difference))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One flight as columns: the truth, every Sun estimate, cells, wheels and control.
+"""One flight as columns: the truth, every estimate of the Sun or the attitude, cells, wheels and control.
 
 It is read from a recording (`read_flight`) or flown in this process (`css_studies.direct_flight`). Topics are
 recognised by their message type, so recordings of other vehicles and under other names work as long as they
@@ -21,6 +21,7 @@ from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
 from css_common.vectors import multiply, row
 from css_msgs.msg import (
+    AttitudeEstimate,
     ControlStatus,
     CssVoltages,
     SpacecraftState,
@@ -34,7 +35,8 @@ from css_studies.message_columns import Columns, stack
 SUNLIT_FRACTION = 0.5
 """The flight is sunlit while more than this fraction of the solar disc is in view."""
 
-ESTIMATE_SUFFIX = "/sun_estimate"
+# Messages of estimators, of which a flight may have several: attribute of the log and end of the topic.
+_ESTIMATES = {SunEstimate: ("estimates", "/sun_estimate"), AttitudeEstimate: ("attitudes", "/attitude")}
 
 # Topics that a flight has once: attribute of the log, type, name in Sunpoint's own recordings.
 _SINGLE = {
@@ -45,7 +47,7 @@ _SINGLE = {
     "control": (ControlStatus, "/control/status"),
 }
 LOGGED_TYPES: dict[str, type] = {
-    f"css_msgs/msg/{kind.__name__}": kind for kind in (SunEstimate, *(kind for kind, _ in _SINGLE.values()))
+    f"css_msgs/msg/{kind.__name__}": kind for kind in (*_ESTIMATES, *(kind for kind, _ in _SINGLE.values()))
 }
 """Messages that a log holds, type name to class."""
 _ARRAY_NORMAL = next(p for p in SPACECRAFT if p.name == "spacecraft.array_normal")
@@ -79,6 +81,7 @@ class FlightLog:
         mission: what flew, None when unknown.
         truth: `SpacecraftState` columns, None for telemetry of a real vehicle.
         estimates: name of the estimator to `SunEstimate` columns.
+        attitudes: name of the attitude filter to `AttitudeEstimate` columns.
         voltages, wheels, torque_command, control: columns of the topic, None when there is none.
         notes: what could not be read, one line each.
     """
@@ -87,6 +90,7 @@ class FlightLog:
     mission: Mission | None = None
     truth: Columns | None = None
     estimates: dict[str, Columns] = field(default_factory=dict)
+    attitudes: dict[str, Columns] = field(default_factory=dict)
     voltages: Columns | None = None
     wheels: Columns | None = None
     torque_command: Columns | None = None
@@ -96,7 +100,8 @@ class FlightLog:
     def columns(self) -> list[Columns]:
         """All columns of the log, none of them empty."""
         single = [getattr(self, name) for name in _SINGLE]
-        return [columns for columns in (*single, *self.estimates.values()) if columns is not None]
+        estimates = [*self.estimates.values(), *self.attitudes.values()]
+        return [columns for columns in (*single, *estimates) if columns is not None]
 
     def add(self, topic: str, message_type: type, columns: Columns) -> None:
         """Take the messages of a topic; types that no log holds, and topics without messages, are ignored.
@@ -105,8 +110,9 @@ class FlightLog:
         """
         if len(columns) == 0:
             return
-        if message_type is SunEstimate:
-            self.estimates[estimator_of(topic)] = columns
+        if message_type in _ESTIMATES:
+            attribute, _ = _ESTIMATES[message_type]
+            getattr(self, attribute)[estimator_of(topic)] = columns
             return
         for attribute, (kind, usual) in _SINGLE.items():
             if kind is not message_type:
@@ -167,6 +173,8 @@ class FlightLog:
         for node in nodes:
             if node.name == name and hasattr(node.values, "use_gyro"):
                 return bool(node.values.use_gyro)
+        if name in self.attitudes:
+            return bool(np.any(self.attitudes[name].used & AttitudeEstimate.USED_GYRO))
         return bool(np.any(self.estimates[name].rate_source == SunEstimate.RATE_GYRO))
 
     @cached_property
@@ -238,7 +246,7 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
             if topic.type in LOGGED_TYPES
         }
         if not messages:
-            raise BagError(f"{path}: holds no truth, Sun estimate, cell output, wheel or control message")
+            raise BagError(f"{path}: holds no truth, estimate, cell output, wheel or control message")
         append = {topic: received.append for topic, (_, received) in messages.items()}
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
@@ -253,4 +261,7 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
 
 def estimator_of(topic: str) -> str:
     """Name of the estimator that publishes a topic: `/ekf/sun_estimate` is of `ekf`."""
-    return topic.removesuffix(ESTIMATE_SUFFIX).strip("/") or "sun_estimate"
+    for _, suffix in _ESTIMATES.values():
+        if topic.endswith(suffix):
+            return topic.removesuffix(suffix).strip("/") or suffix.strip("/")
+    return topic.strip("/")

@@ -13,13 +13,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from css_studies.estimate_errors import estimated_rows, heading_errors
+from css_studies.estimate_errors import attitude_errors, estimated_rows, heading_errors
 from css_studies.flight_log import FlightLog
 
 POWER_POSITIVE = np.radians(30.0)
 """Largest angle [rad] between array normal and Sun at which the arrays carry the spacecraft."""
 ACQUIRED_AFTER = 60.0
 """Power-positive time [s] that makes an acquisition."""
+SETTLED_AFTER = 300.0
+"""Time [s] from the epoch after which an attitude filter counts as settled."""
 FINAL_TIME = 60.0
 """Time [s] at the end of the flight over which the final rate is averaged."""
 
@@ -29,6 +31,9 @@ QUANTITIES = {
     "power_positive_s": "sunlit time [s] with the Sun over 30 deg off the array normal; None if never within",
     "heading_error_mean_deg": "mean angle [deg] of estimated to true Sun, sunlit, after acquisition",
     "heading_error_p95_deg": "95th percentile of the same angle [deg]",
+    "attitude_error_mean_deg": "mean angle [deg] of estimated to true attitude, from 300 s on",
+    "attitude_error_p95_deg": "95th percentile of the same angle [deg]",
+    "attitude_nees": "mean normalised error squared of the attitude, 3 if the filter is consistent, from 300 s on",
     "pointing_error_mean_deg": "mean angle [deg] of array normal to true Sun, sunlit, after acquisition",
     "pointing_error_sunlit_deg": "the same over all sunlit steps [deg], those before acquisition included",
     "heading_error_sunlit_deg": "mean angle [deg] of estimated to true Sun over all sunlit steps with an estimate",
@@ -57,13 +62,14 @@ def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: st
             "flown": name == flown,
             "power_positive_s": flight["power_positive_s"],
             **_heading_quantities(log, name),
+            **_attitude_quantities(log, name),
             "pointing_error_mean_deg": flight["pointing_error_mean_deg"],
             "pointing_error_sunlit_deg": flight["pointing_error_sunlit_deg"],
             "heading_error_sunlit_deg": _heading_error_sunlit(log, name),
             "rate_final_deg_s": flight["rate_final_deg_s"],
             "steps_without_estimate": _steps_without_estimate(log, name),
         }
-        for name in (log.estimates if names is None else names)
+        for name in ((*log.estimates, *log.attitudes) if names is None else names)
     ]
 
 
@@ -125,7 +131,7 @@ def _flight_quantities(log: FlightLog) -> Run:
 
 def _heading_quantities(log: FlightLog, name: str) -> Run:
     mean = p95 = None
-    if log.truth is not None:
+    if log.truth is not None and name in log.estimates:
         steps, errors = heading_errors(log, name)
         errors = errors[_counted(log, acquisition(log))[steps]]
         mean = _mean_deg(errors)
@@ -134,10 +140,22 @@ def _heading_quantities(log: FlightLog, name: str) -> Run:
 
 
 def _heading_error_sunlit(log: FlightLog, name: str) -> float | None:
-    if log.truth is None:
+    if log.truth is None or name not in log.estimates:
         return None
     steps, errors = heading_errors(log, name)
     return _mean_deg(errors[log.sunlit[steps]])
+
+
+def _attitude_quantities(log: FlightLog, name: str) -> Run:
+    mean = p95 = nees = None
+    if log.truth is not None and name in log.attitudes:
+        steps, errors, squared = attitude_errors(log, name)
+        settled = log.time(log.truth)[steps] >= SETTLED_AFTER - 0.01 * log.period
+        mean = _mean_deg(errors[settled])
+        if settled.any():
+            p95 = float(np.degrees(np.percentile(errors[settled], 95.0)))
+            nees = float(np.mean(squared[settled]))
+    return {"attitude_error_mean_deg": mean, "attitude_error_p95_deg": p95, "attitude_nees": nees}
 
 
 def _steps_without_estimate(log: FlightLog, name: str) -> int | None:

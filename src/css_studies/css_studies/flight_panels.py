@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from css_msgs.msg import ControlStatus, SunEstimate
-from css_studies.estimate_errors import heading_errors
+from css_studies.estimate_errors import attitude_errors, heading_errors
 from css_studies.figure_style import (
     BLACK,
     BLUE,
@@ -69,6 +69,10 @@ def draw_heading_error(
 ) -> None:
     """Angle of estimated to true Sun; a stretch of steps without estimate is a gap in the line."""
     steps, errors = heading_errors(log, name)
+    _draw_errors(axes, log, unit, steps, errors, colour, label)
+
+
+def _draw_errors(axes, log: FlightLog, unit: TimeAxis, steps, errors, colour: Colour, label: str) -> None:
     degrees = np.maximum(np.degrees(errors), _LEAST_ERROR)
     time = log.time(log.having("truth"))[steps] / unit.scale
     spacing = np.diff(steps, prepend=steps[:1])
@@ -118,14 +122,21 @@ def _heading_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     finish_heading_error(axes)
 
 
+def _attitude_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    for name, colour in zip(log.attitudes, colours(len(log.attitudes)), strict=True):
+        steps, errors, _ = attitude_errors(log, name)
+        _draw_errors(axes, log, unit, steps, errors, colour, name)
+    finish_heading_error(axes)
+
+
 def _pointing_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     draw_pointing_error(axes, log, unit, BLACK)
     finish_pointing_error(axes)
 
 
 def _body_rate(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
-    for name, colour in zip(log.estimates, colours(len(log.estimates)), strict=True):
-        columns = log.estimates[name]
+    estimates = log.estimates | log.attitudes
+    for (name, columns), colour in zip(estimates.items(), colours(len(estimates)), strict=True):
         rate = np.degrees(np.linalg.norm(columns.omega_bn_b, axis=1))
         draw_series(axes, log.time(columns) / unit.scale, rate, colour, f"estimated by {name}")
     if log.truth is not None:
@@ -176,6 +187,7 @@ class Panel(NamedTuple):
 
 
 _HEADING_ERROR = Panel("heading_error", "Estimated to true Sun", 1.3, _heading_error)
+_ATTITUDE_ERROR = Panel("attitude_error", "Estimated to true attitude", 1.3, _attitude_error)
 _POINTING_ERROR = Panel("pointing_error", "Array normal to true Sun", 1.0, _pointing_error)
 _BODY_RATE = Panel("body_rate", "Body rate", 1.0, _body_rate)
 _CONTROL_MODE = Panel("control_mode", "Control mode", 0.8, _control_mode)
@@ -188,8 +200,9 @@ def panels_of(log: FlightLog) -> list[Panel]:
     has_truth, has_estimates = log.truth is not None, bool(log.estimates)
     chosen = {
         _HEADING_ERROR: has_truth and has_estimates,
+        _ATTITUDE_ERROR: has_truth and bool(log.attitudes),
         _POINTING_ERROR: has_truth,
-        _BODY_RATE: has_truth or has_estimates,
+        _BODY_RATE: has_truth or has_estimates or bool(log.attitudes),
         _CONTROL_MODE: log.control is not None,
         _WHEEL_SPEED: log.wheels is not None,
         _CELL_OUTPUT: log.voltages is not None,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What people read of the runs of a flight: a table, and the mission's pass criteria that they miss."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TextIO
 
 from rich import box
@@ -16,6 +16,9 @@ _COLUMNS = {
     "power_positive_s": ("con-\nverging\n[s]", "{:.1f}"),
     "heading_error_mean_deg": ("heading\nerror\nmean\n[deg]", "{:.2f}"),
     "heading_error_p95_deg": ("heading\nerror\n95 %\n[deg]", "{:.2f}"),
+    "attitude_error_mean_deg": ("attitude\nerror\nmean\n[deg]", "{:.3f}"),
+    "attitude_error_p95_deg": ("attitude\nerror\n95 %\n[deg]", "{:.3f}"),
+    "attitude_nees": ("attitude\nNEES\n(3)", "{:.2f}"),
     "pointing_error_mean_deg": ("pointing\nerror\nmean\n[deg]", "{:.2f}"),
     "rate_final_deg_s": ("final\nrate\n[deg/s]", "{:.3f}"),
     "steps_without_estimate": ("steps\nwithout\nestimate", "{:d}"),
@@ -27,19 +30,28 @@ def summary_table(runs: Iterable[Run], title: str = "") -> Table:
 
     It fits into 80 columns, which is what a console has that is no terminal.
     """
+    runs = list(runs)
     table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("estimator", no_wrap=True)
     table.add_column("gyro")
-    for heading, _ in _COLUMNS.values():
+    columns = _columns_of(runs)
+    for heading, _ in columns.values():
         # as Text, because markup would take a unit for a style
         table.add_column(Text(heading), justify="right")
     for run in runs:
         shown = []
-        for quantity, (_, text) in _COLUMNS.items():
+        for quantity, (_, text) in columns.items():
             value = run[quantity]
             shown.append("-" if value is None else text.format(value))
         table.add_row(Text(run["estimator"] + (" (flown)" if run["flown"] else "")), run["gyro"], *shown)
     return table
+
+
+def _columns_of(runs: Sequence[Run]) -> dict[str, tuple[str, str]]:
+    """The columns of Sun estimators, and where there are attitude filters, theirs and what else has a value."""
+    if any(run["attitude_error_mean_deg"] is not None for run in runs):
+        return {name: column for name, column in _COLUMNS.items() if any(run[name] is not None for run in runs)}
+    return {name: column for name, column in _COLUMNS.items() if not name.startswith("attitude")}
 
 
 def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = None) -> None:
@@ -76,5 +88,5 @@ def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterabl
             if high is not None and not value <= high:
                 failures.append(f"{where} is {value:.6g}, above criteria.{quantity}.max {high:g}")
     if criteria and not judged:
-        failures.append("the flight has no Sun estimate that criteria could judge")
+        failures.append("the flight has no estimate that criteria could judge")
     return failures

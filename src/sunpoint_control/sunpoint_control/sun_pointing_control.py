@@ -111,6 +111,8 @@ def parameters(values: Values) -> ControlParameters:
 def conflicts(values: Values):
     """What is wrong between parameters, one message each."""
     yield from modes.conflicts(values)
+    if not values.wheels.fitted:
+        yield "wheels.fitted: false, but the control turns the spacecraft with its wheels"
     count = len(values.wheels.axes)
     for index in values.wheels_out:
         if index >= count:

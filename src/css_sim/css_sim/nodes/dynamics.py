@@ -40,8 +40,6 @@ class Dynamics(Plant):
             lengths={"torque": len(values.wheels.axes)},
             used=("torque",),
         )
-        if not values.rods.fitted:
-            return (wheels,)
         rods = Input(
             "rods",
             "rods/dipole_command",
@@ -50,14 +48,14 @@ class Dynamics(Plant):
             lengths={"dipole": len(values.rods.axes)},
             used=("dipole",),
         )
-        return wheels, rods
+        fitted = ((wheels, values.wheels.fitted), (rods, values.rods.fitted))
+        return tuple(actuator for actuator, is_there in fitted if is_there)
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        outputs = [
-            Output("truth", "truth", SpacecraftState, frame=INERTIAL),
-            Output("wheels", "wheels/state", WheelState),
-        ]
+        outputs = [Output("truth", "truth", SpacecraftState, frame=INERTIAL)]
+        if values.wheels.fitted:
+            outputs.append(Output("wheels", "wheels/state", WheelState))
         if values.publish_pose:
             outputs.append(Output("pose", "truth/pose", PoseStamped, frame=INERTIAL))
         return tuple(outputs)
@@ -87,7 +85,7 @@ class Dynamics(Plant):
         return self._messages(self.epoch_ns, 0, 0)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        wheels, rods = received["wheels"], received.get("rods")
+        wheels, rods = received.get("wheels"), received.get("rods")
         self._state, torque_limited, speed_limited = self._advance(
             self._craft,
             self._state,
@@ -106,8 +104,6 @@ class Dynamics(Plant):
         # kept, because the cycle that begins at this stamp needs it too
         self._surroundings = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
         state, surroundings = self._state, self._surroundings
-        speed = np.zeros(len(self._momentum))
-        self._wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
         messages = {
             "truth": self.message(
                 "truth",
@@ -121,15 +117,18 @@ class Dynamics(Plant):
                 solar_flux=surroundings.solar_flux,
                 illumination=surroundings.illumination,
             ),
-            "wheels": self.message(
+        }
+        if self.values.wheels.fitted:
+            speed = np.zeros(len(self._momentum))
+            self._wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
+            messages["wheels"] = self.message(
                 "wheels",
                 stamp_ns,
                 speed_limited=speed_limited,
                 speed=speed,
                 torque_limited=torque_limited,
                 torque=self._torque.copy(),
-            ),
-        }
+            )
         if self.values.publish_pose:
             # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
             # dcm_bn in the convention of css_common.attitude

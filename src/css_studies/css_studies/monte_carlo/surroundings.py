@@ -104,7 +104,7 @@ class SurroundingsTables:
 
     Args:
         plant: values of the node that owns the truth (its orbit, shadow and field).
-        estimator: values of the estimator that flies (its eclipse prediction).
+        estimator: values of the estimator that flies (its eclipse prediction); None: none asks for one.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
@@ -114,14 +114,16 @@ class SurroundingsTables:
     def __init__(
         self,
         plant: Values,
-        estimator: Values,
+        estimator: Values | None,
         reflectivity: np.ndarray | None,
         own_earth: bool = False,
         field: bool = True,
         albedo_model: int = PATCHES,
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field)
-        self._prediction = None if estimator.eclipse.source == "sensors" else EclipsePrediction(estimator)
+        self._prediction: EclipsePrediction | None = None
+        if estimator is not None and estimator.eclipse.source != "sensors":
+            self._prediction = EclipsePrediction(estimator)
         self._period_ns = round(plant.mission.period * 1e9)
         self._epoch_ns = parse_utc(plant.mission.epoch)
         self._reflectivity = reflectivity

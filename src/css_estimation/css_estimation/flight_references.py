@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the flight's own models say about Sun, field and Earthlight at its place: directions known in n.
+
+They are computed with the filter's parameters, not with the truth's: a lower degree of the field, an offset or another
+reflectivity of the Earth make filter and truth differ as they do in flight.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.epochs import parse_utc
+from css_common.kernel import typed_call
+from css_common.schema import Table, Values, choice, flag, integer, real, reals
+from css_common.vectors import Vec3, add
+from css_environment.earth_light import albedo_sources, new_earth_view, new_light
+from css_environment.magnetic_field import HIGHEST_DEGREE
+from css_environment.mission_environment import MissionEnvironment
+from css_environment.reflectivity import named_reflectivity
+
+PARAMETERS: Table = (
+    integer(
+        "reference.field_degree", HIGHEST_DEGREE, "-", "highest degree of the field model", low=1, high=HIGHEST_DEGREE
+    ),
+    reals("reference.field_offset_nt", (0.0, 0.0, 0.0), "nT", "error put on the field model, in n", length=3),
+    flag("albedo.compensate", False, "take the predicted light of the Earth off each cell's output"),
+    choice(
+        "albedo.reflectivity",
+        "zonal",
+        ("zonal", "knocke", "constant"),
+        "the Earth of the prediction: annual means by latitude, seasonal model by latitude, one value",
+    ),
+    real("albedo.constant", 0.3, "-", "the one value", low=0.0, high=1.0),
+    real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0),
+    real("albedo.share_sigma", 0.3, "-", "error of a predicted albedo, relative, 1 sigma", low=0.0, high=10.0),
+)
+
+_FULL_DISC = 0.99
+
+
+class References(NamedTuple):
+    """Directions in n at one instant."""
+
+    sun_n: Vec3  # unit vector to the Sun
+    intensity: float  # of sunlight, 1 at 1 AU
+    sunlit: bool  # outside of shadow and penumbra
+    field_n: Vec3  # [T]
+
+
+class FlightReferences:
+    """Models along the orbit of the mission's `orbit` section.
+
+    Attributes:
+        light: (192,) patches of light of the Earth of the last `at`, zeros without compensation.
+    """
+
+    def __init__(self, values: Values) -> None:
+        """Takes sections mission and orbit, and `PARAMETERS`."""
+        self._environment = MissionEnvironment(values, field=True, field_degree=values.reference.field_degree)
+        x, y, z = (1e-9 * values.reference.field_offset_nt).tolist()
+        self._offset_n: Vec3 = (x, y, z)
+        albedo = values.albedo
+        self._compensate: bool = albedo.compensate
+        grid = named_reflectivity(albedo.reflectivity, albedo.constant, parse_utc(values.mission.epoch))
+        self._reflectivity = np.minimum(albedo.factor * grid.mean, 1.0)
+        self.light = new_light()
+        self._view = new_earth_view()
+        self._sources = typed_call(albedo_sources)
+
+    def at(self, elapsed_s: float) -> References:
+        """References at an instant [s after the epoch]; `light` is renewed."""
+        e = self._environment.at(elapsed_s)
+        sunlit = e.illumination > _FULL_DISC
+        if self._compensate and sunlit:
+            self._sources(self._view, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, self._reflectivity, self.light)
+        return References(e.sun_n, e.solar_flux * e.illumination, sunlit, add(e.field_n, self._offset_n))

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude and gyro bias from cells, magnetometer and gyro."""
+
+from collections.abc import Iterable
+
+from sensor_msgs.msg import Imu, MagneticField
+
+from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
+from css_common.run import node_main
+from css_common.schema import Values
+from css_estimation import attitude_ekf, attitude_options, attitude_solution, flight_references
+from css_estimation.flight_references import FlightReferences
+from css_estimation.messages import attitude_estimate_fields, field_reading, gyro_reading
+from css_msgs.msg import AttitudeEstimate, CssVoltages
+
+
+class AttitudeFilter(Component):
+    """Attitude and gyro bias by a multiplicative Kalman filter; the Sun as a vector or as voltages (DiGregorio)."""
+
+    shared = ("cells", "orbit", "magnetometer")
+    parameters = (*attitude_options.PARAMETERS, *flight_references.PARAMETERS)
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        return (
+            Input("cells", "css/voltages", CssVoltages, lengths={"voltages": len(values.cells.normals)}),
+            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
+            Input(
+                "field",
+                "mag/field",
+                MagneticField,
+                required=False,
+                divider=values.magnetometer.divider,
+                used=("magnetic_field",),
+            ),
+        )
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        if values.calibration.mode != "off" and values.sun_model == "vector":
+            yield f"calibration.mode: {values.calibration.mode} given, but sun_model vector calibrates no cells"
+
+    def configure(self) -> None:
+        self._parameters = attitude_options.parameters(self.values)
+        self._state = attitude_solution.initial_state(self._parameters)
+        self._memory = attitude_solution.initial_memory(self._parameters)
+        self._step = typed_call(attitude_ekf.step)
+        self._references = FlightReferences(self.values)
+        self._last_stamp_ns: int | None = None
+
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._parameters = attitude_options.parameters(values)
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        self._last_stamp_ns = stamp_ns
+        cells = received["cells"]
+        assert cells is not None  # a required input
+        gyro_b, gyro_valid = gyro_reading(received["gyro"])
+        field_b, field_valid = field_reading(received["field"])
+        self._state, solution = self._step(
+            self._parameters,
+            self._state,
+            self._memory,
+            since_ns / 1e9,
+            cells.voltages,
+            gyro_b,
+            gyro_valid,
+            field_b,
+            field_valid,
+            self._references.at((stamp_ns - self.epoch_ns) * 1e-9),
+            self._references.light,
+        )
+        fields = attitude_estimate_fields(solution, self._memory.covariance)
+        return {"attitude": self.message("attitude", stamp_ns, **fields)}
+
+
+main = node_main(AttitudeFilter)
+
+if __name__ == "__main__":
+    raise SystemExit(main())
