@@ -106,6 +106,27 @@ def test_four_diodes_in_a_plane_want_voltages(totals):
     assert mean(t, "error_sum", VOLTAGE) < 1.2 * mean(totals["six"], "error_sum", VOLTAGE)
 
 
+def test_predicting_the_light_of_the_earth_gives_back_what_it_costs(totals):
+    """Truth with albedo and cells that do not read below zero, the filter's Earth a fifth too dark."""
+    albedo = ("css_array.albedo.enabled=true", "css_array.albedo.factor=1.25", "css_array.output_low=0")
+    compensating, ignorant = (
+        AttitudeFlight(mission(*albedo, f"attitude_voltage.albedo.compensate={word}")).fly(CASES).tallies.totals
+        for word in ("true", "false")
+    )
+    assert mean(compensating, "error_sum", VOLTAGE) < 0.4 * mean(ignorant, "error_sum", VOLTAGE)
+    assert mean(compensating, "error_sum", VOLTAGE) < 1.3 * mean(totals["six"], "error_sum", VOLTAGE)
+    assert mean(compensating, "nees3_sum", VOLTAGE) < 4.0
+
+
+def test_a_coarser_field_model_than_the_truths(totals):
+    """Harmonics up to degree 8 of 13 leave out some 20 nT, a tenth of the magnetometer's noise."""
+    coarse = [f"{name}.reference.field_degree=8" for name in ("attitude_vector", "attitude_voltage")]
+    t = AttitudeFlight(mission(*coarse)).fly(CASES).tallies.totals
+    for f in (VECTOR, VOLTAGE):
+        assert mean(t, "error_sum", f) != mean(totals["six"], "error_sum", f)
+        assert mean(t, "error_sum", f) < 1.1 * mean(totals["six"], "error_sum", f)
+
+
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
