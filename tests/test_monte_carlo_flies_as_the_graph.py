@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from flights import fly_composed
 
-from css_common.mission import find_mission, mission_from_text
+from css_common.mission import find_mission, load_mission, mission_from_text
+from css_msgs.msg import SunEstimate
 from css_studies.direct_flight import configured
 from css_studies.flight_log import read_flight
 from css_studies.monte_carlo.chunk import fly_cases
@@ -45,3 +46,26 @@ def test_every_step_of_a_case_equals_that_of_the_composed_graph(estimator, tmp_p
     assert len(trace) == 600
     sources = np.unique(estimates.rate_source)
     assert len(sources) == 3, "the flight has steps with gyro, with rates from the Sun and without any"
+
+
+def test_safe_hold_with_magnetometer_and_rods_equals_the_composed_graph(tmp_path):
+    """From the shadow, where the rods work, past sunrise."""
+    mission = load_mission("clark_1996_pyramid", ["mission.duration=150.0", "orbit.true_anomaly_deg=43.0"])
+    fly_composed(configured(mission, case=CASE), tmp_path / "bag")
+    log = read_flight(tmp_path / "bag")
+    truth, estimates = log.having("truth"), log.estimates["pyramid_switch"]
+    assert not log.sunlit[0] and log.sunlit[-1]
+    assert np.any(log.having("control").dumping)
+    assert SunEstimate.RATE_FIELD in estimates.rate_source
+
+    trace = fly_cases(MissionFlight(mission), np.array([CASE]), 10, traced=True).trace[0]
+    columns = (
+        truth.sigma_bn,
+        truth.omega_bn_b,
+        estimates.sun_b,
+        estimates.omega_bn_b,
+        log.having("torque_command").torque,
+        log.having("wheels").speed,
+    )
+    np.testing.assert_array_equal(trace, np.hstack(columns))
+    assert len(trace) == 300

@@ -26,6 +26,7 @@ VERBS = {
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_studies", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_studies", "coverage"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_studies", "reproduce"),
+    "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_studies", "slit_analyse"),
     "test": Verb("run ruff, mypy and all tests; arguments go to pytest"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
 }

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from css_common.codec import Codec, Sample, codec_of
-from css_common.component import Component, Input
+from css_common.component import Component, Input, messages_of
 from css_common.edge import Edge, Matcher
 from css_common.mission import Mission, Node, find_component
 from css_common.mission_file import MissionError
@@ -186,7 +186,7 @@ class Replay:
         except Exception as error:  # as in flight: no estimate for this stamp, and the next cycle goes on
             self._note_failure(run, f"cycle failed: {error!r}")
             return
-        for key, sample in outgoing.items():
+        for key, sample in messages_of(outgoing):
             topic, codec = run.outputs[key]
             bad = codec.first_not_finite(codec.real_fields(), sample)
             if bad is not None:

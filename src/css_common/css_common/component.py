@@ -6,7 +6,7 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -55,6 +55,7 @@ class Output:
         frame: whose frame_id it carries, `BODY` or `INERTIAL`.
         divider: published every `divider` steps.
         ends_cycle: in lockstep the plant waits for it before it advances (estimates and commands).
+        events: any number of messages a step, stamped when they happened; nothing can wait for them or match them.
     """
 
     key: str
@@ -63,15 +64,34 @@ class Output:
     frame: str = BODY
     divider: int = 1
     ends_cycle: bool = False
+    events: bool = False
 
 
 Received = Mapping[str, Any]
 """Input key to `Sample`; None for an optional input that is silent and for one that is not due."""
-Outgoing = Mapping[str, Sample]
+Outgoing = Mapping[str, Sample | tuple[Sample, ...]]
+"""Output key to its message of the step, or to those of an output of events."""
+
+
+def messages_of(outgoing: Outgoing) -> Iterator[tuple[str, Sample]]:
+    """Each message that a component gave, with the key of its output."""
+    for key, given in outgoing.items():
+        if isinstance(given, tuple):
+            for sample in given:
+                yield key, sample
+        else:
+            yield key, given
+
+
+def _unheard(text: str) -> None:
+    """Where the reports of a component without a host go."""
 
 
 class Component:
     """One part of the flight graph, cycled once per step.
+
+    Attributes:
+        report: takes a line for the log; a host makes it the node's.
 
     Class attributes:
         shared: mission sections whose values the component reads (`sections.SECTIONS`), besides mission and io.
@@ -85,6 +105,7 @@ class Component:
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
         self.values = values
+        self.report: Callable[[str], object] = _unheard
         self.period_ns = round(values.mission.period * 1e9)
         self.epoch_ns = parse_utc(values.mission.epoch)
         self.frames = {

@@ -25,7 +25,7 @@ from rclpy.timer import Timer
 
 from css_common import ros_parameters, sections
 from css_common.codec import Sample, codec_of
-from css_common.component import Component, Outgoing, Output, Plant
+from css_common.component import Component, Outgoing, Output, Plant, messages_of
 from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import Edge, Matcher
 from css_common.mission import Event, Mission
@@ -178,6 +178,7 @@ class ComponentNode(LifecycleNode):
             raise ParameterError(reason)
         name = self.get_name()
         self.component = self.component_type(name, shaped_values(self._table, self._canonical))
+        self.component.report = self.get_logger().info
         values = self.component.values
         inputs = self.component_type.inputs(name, values)
         rehearse(self.component_type, name, values)
@@ -307,7 +308,7 @@ class ComponentNode(LifecycleNode):
             self.counters["cycles"] += 1
 
     def _publish(self, outgoing: Outgoing) -> None:
-        for key, sample in outgoing.items():
+        for key, sample in messages_of(outgoing):
             publisher, codec, real_fields, topic = self._output_ports[key]
             bad = codec.first_not_finite(real_fields, sample)
             if bad is not None:

@@ -165,7 +165,7 @@ class Mission:
         ends = [o.topic for n in others for o in n.outputs if o.ends_cycle]
         if not ends:
             consumed = {i.topic for n in others for i in n.inputs}
-            return tuple(o.topic for n in others for o in n.outputs if o.topic not in consumed)
+            return tuple(o.topic for n in others for o in n.outputs if o.topic not in consumed and not o.events)
         implied = {
             i.topic
             for n in others
@@ -292,6 +292,11 @@ class Mission:
                 f"{self.origin}: {node.name} takes {entry.topic} as {type_name(entry.message_type)}, "
                 f"{publisher} publishes {type_name(output.message_type)}"
             )
+        if node.values.io.input_matching == "exact" and output.events:
+            raise MissionError(
+                f"{self.origin}: {node.name} expects {entry.topic} for each step, "
+                f"{publisher} publishes it only when something happens"
+            )
         if node.values.io.input_matching == "exact" and entry.divider % output.divider:
             raise MissionError(
                 f"{self.origin}: {node.name} expects {entry.topic} every {entry.divider} steps, "
@@ -321,6 +326,11 @@ class Mission:
             if topic not in publishers:
                 raise MissionError(
                     f"{self.origin}: {SHARED}: lockstep.wait_for: {unknown_name(topic, publishers)}"
+                )
+            name, output = publishers[topic]
+            if output.events:
+                raise MissionError(
+                    f"{self.origin}: {SHARED}: lockstep.wait_for: {name} publishes {topic} only when something happens"
                 )
 
 

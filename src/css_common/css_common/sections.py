@@ -29,7 +29,7 @@ MISSION: Table = (
 )
 
 ORBIT: Table = (
-    choice("orbit.source", "elements", ("elements", "tle"), "what defines the orbit"),
+    choice("orbit.source", "elements", ("elements", "tle", "ballistic"), "what defines the orbit"),
     real("orbit.altitude", 400e3, "m", "semi-major axis above the equatorial radius", low=_LOWEST, high=1e9),
     real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9),
     real("orbit.inclination_deg", 45.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
@@ -39,6 +39,26 @@ ORBIT: Table = (
     flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
     text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
     text("orbit.tle_line2", "", "second line of the element set"),
+    real(
+        "orbit.launch.latitude_deg",
+        69.29,
+        "deg",
+        "geodetic latitude where a ballistic arc begins",
+        low=-90.0,
+        high=90.0,
+    ),
+    real("orbit.launch.longitude_deg", 16.02, "deg", "its longitude, east", low=-180.0, high=360.0),
+    real("orbit.launch.height", 0.0, "m", "its height above the ellipsoid", low=-500.0, high=100e3),
+    real(
+        "orbit.launch.azimuth_deg",
+        330.0,
+        "deg",
+        "direction of the arc's start from north over east",
+        low=-360.0,
+        high=360.0,
+    ),
+    real("orbit.launch.elevation_deg", 80.0, "deg", "its elevation", low=10.0, high=90.0),
+    real("orbit.launch.apogee", 169e3, "m", "height of its apogee above the ellipsoid", low=1e3, high=2000e3),
 )
 
 SPACECRAFT: Table = (
@@ -95,6 +115,75 @@ MAGNETOMETER: Table = (
     integer("magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000),
 )
 
+PAYLOAD: Table = (
+    real(
+        "payload.axis_azimuth_deg",
+        330.0,
+        "deg",
+        "angular momentum at the epoch, from north over east",
+        low=-360.0,
+        high=360.0,
+    ),
+    real("payload.axis_elevation_deg", 80.0, "deg", "its elevation", low=-90.0, high=90.0),
+    reals(
+        "payload.phase_starts",
+        (0.0,),
+        "s",
+        "when a phase of torque-free motion begins, after the epoch",
+        low=0.0,
+        high=1e5,
+    ),
+    reals("payload.spin_hz", (5.45,), "Hz", "turns a second relative to the Sun in each phase", low=0.01, high=50.0),
+    reals(
+        "payload.coning_period",
+        (0.2618,),
+        "s",
+        "turn of the spin axis about the angular momentum in each phase",
+        low=0.01,
+        high=1e3,
+    ),
+    reals(
+        "payload.coning_angle_deg",
+        (12.89,),
+        "deg",
+        "full angle of the cone of the spin axis in each phase",
+        low=0.0,
+        high=120.0,
+    ),
+    real(
+        "payload.final_coning_period",
+        0.0,
+        "s",
+        "to which the period of the last phase drifts by its end; 0: it stays",
+        low=0.0,
+        high=1e3,
+    ),
+    real("payload.flat_spin_start", 1e5, "s", "when the cone of the last phase begins to open", low=0.0, high=1e5),
+    real("payload.flat_spin_rate_deg_s", 4.0, "deg/s", "growth of its half angle", low=0.1, high=90.0),
+    real("payload.flat_spin_angle_deg", 85.0, "deg", "half angle at which it ends", low=1.0, high=89.9),
+)
+
+SLITS: Table = (
+    real("slits.counter_hz", 1e6, "Hz", "frequency of the timer", low=1e3, high=1e9),
+    real("slits.inclination_deg", 30.0, "deg", "of the two slanted slits to the spin axis", low=5.0, high=85.0),
+    real(
+        "slits.field_of_view_deg",
+        120.0,
+        "deg",
+        "range of Sun angles over which a slit is lit, about the equator",
+        low=2.0,
+        high=179.0,
+    ),
+    reals(
+        "slits.head_azimuths_deg",
+        (0.0,),
+        "deg",
+        "places of the sensor heads around the spin axis, at most 8",
+        low=-360.0,
+        high=360.0,
+    ),
+)
+
 GRAPH: Table = (
     texts(
         "graph.nodes",
@@ -149,6 +238,8 @@ SECTIONS: dict[str, Table] = {
     "wheels": WHEELS,
     "rods": RODS,
     "magnetometer": MAGNETOMETER,
+    "payload": PAYLOAD,
+    "slits": SLITS,
     "graph": GRAPH,
     "lockstep": LOCKSTEP,
     "io": IO,
@@ -180,6 +271,10 @@ def conflicts(values: Values) -> Iterator[str]:
             yield f"wheels.axes: they span {rank} of 3 directions, expected axes that span all"
     if hasattr(values, "rods"):
         yield from _unit_rows("rods.axes", values.rods.axes, 1, 32)
+    if hasattr(values, "payload"):
+        yield from _payload_conflicts(values.payload)
+    if hasattr(values, "slits"):
+        yield from _slits_conflicts(values.slits)
     if hasattr(values, "io"):
         for key in ("body_frame", "inertial_frame"):
             if len(getattr(values.io, key).encode()) >= MAX_FRAME:
@@ -231,6 +326,35 @@ def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:
     length = np.linalg.norm(spacecraft.array_normal)
     if abs(length - 1.0) > 1e-6:
         yield f"spacecraft.array_normal: length {length:.6g} given, expected a unit vector"
+
+
+def _payload_conflicts(payload: Values) -> Iterator[str]:
+    starts = payload.phase_starts
+    if not len(starts) or starts[0] != 0.0 or np.any(np.diff(starts) <= 0.0):
+        yield f"payload.phase_starts: {starts.tolist()} given, expected times that grow from 0.0"
+        return
+    for key in ("spin_hz", "coning_period", "coning_angle_deg"):
+        given = getattr(payload, key)
+        if len(given) != len(starts):
+            yield f"payload.{key}: {len(given)} values given, expected {len(starts)}, one for each phase"
+            return
+    for key, period in (("coning_period", payload.coning_period), ("final_coning_period", payload.final_coning_period)):
+        # the ratio of axial to transverse moment of inertia, which no body has above 2
+        ratio = 1.0 / (payload.spin_hz * np.where(period == 0.0, payload.coning_period, period))
+        if np.any(ratio >= 2.0):
+            yield f"payload.{key}: the coning is {ratio.max():.3g} times as fast as the spin, expected less than 2"
+    if payload.flat_spin_start <= starts[-1]:
+        yield f"payload.flat_spin_start: {payload.flat_spin_start:g} given, expected a time after the last phase begins"
+    if 2.0 * payload.flat_spin_angle_deg <= payload.coning_angle_deg[-1]:
+        yield "payload.flat_spin_angle_deg: expected more than half the coning angle of the last phase"
+
+
+def _slits_conflicts(slits: Values) -> Iterator[str]:
+    heads = slits.head_azimuths_deg
+    if not 1 <= len(heads) <= 8:
+        yield f"slits.head_azimuths_deg: {len(heads)} given, expected 1 to 8"
+    elif len(np.unique(np.round(np.mod(heads, 360.0), 6))) != len(heads):
+        yield "slits.head_azimuths_deg: two heads at one place, expected different azimuths"
 
 
 def _unit_rows(name: str, rows: np.ndarray, least: int, most: int) -> Iterator[str]:

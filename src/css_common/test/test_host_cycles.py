@@ -151,6 +151,11 @@ def test_estimate_with_nan_is_withheld_counted_and_logged_once(rig, bench):
     assert rig.node.health()[0] == DiagnosticStatus.ERROR
 
 
+def test_what_a_component_reports_is_logged_by_its_node(rig, bench):
+    rig.node.component.report("the Sun is up")
+    bench.until(lambda: bench.logged("the Sun is up") == 1, "the line is in the log")
+
+
 def test_time_set_back_begins_anew(rig):
     rig.feed(*[voltages(1000 + k) for k in range(3)])
     rig.until_estimates(3)

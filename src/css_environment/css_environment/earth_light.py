@@ -108,7 +108,7 @@ def look_at_earth(
     ratio = EARTH_RADIUS / max(norm(r_n), 1.0001 * EARTH_RADIUS)
     disc_cos = math.sqrt(1.0 - ratio * ratio)
     view.disc[0], view.disc[1] = disc_cos, ratio
-    up, x, y = _frame(r_n, sun_n)
+    up, x, y = upright_frame(r_n, sun_n)
     for i in range(3):
         view.frame[0, i], view.frame[1, i], view.frame[2, i] = x[i], y[i], up[i]
     up_e, x_e, y_e = multiply(dcm_en, up), multiply(dcm_en, x), multiply(dcm_en, y)
@@ -182,7 +182,7 @@ def gather_light(view: EarthView, reflectivity, light) -> None:
                         sum_x += w * sine * _COS_AZIMUTH[first_azimuth + a]
                         sum_y += w * sine * _SIN_AZIMUTH[first_azimuth + a]
                         sum_z -= w * cosine
-            _write_patch(view.frame, sum_light, (sum_x, sum_y, sum_z), patch, light)
+            write_patch(sum_light, _in_n(view.frame, (sum_x, sum_y, sum_z)), patch, light)
             total += sum_light
             patch += 1
         first_sample += outward * points
@@ -192,25 +192,35 @@ def gather_light(view: EarthView, reflectivity, light) -> None:
 
 
 @kernel
-def _write_patch(frame, total: float, moment: Vec3, patch: int, light) -> None:
-    """Mean direction and size from the light of a patch and its first moment in the frame of the view."""
+def _in_n(frame, v: Vec3) -> Vec3:
+    """A vector of the view's frame, in n."""
+    return (
+        v[0] * frame[0, 0] + v[1] * frame[1, 0] + v[2] * frame[2, 0],
+        v[0] * frame[0, 1] + v[1] * frame[1, 1] + v[2] * frame[2, 1],
+        v[0] * frame[0, 2] + v[1] * frame[1, 2] + v[2] * frame[2, 2],
+    )
+
+
+@kernel
+def write_patch(total: float, moment_n: Vec3, patch: int, light) -> None:
+    """Mean direction and size from the light of a patch and its first moment in n, into `light` (`new_light`)."""
     if total <= 0.0:
         for i in range(3):
             light[i * PATCHES + patch] = 0.0
         light[LIGHT + patch], light[SIZE + patch] = 0.0, 1.0
         return
-    mean = scale(1.0 / total, moment)
+    mean = scale(1.0 / total, moment_n)
     # The mean of unit vectors falls short of length one by the spread. A patch evenly bright over 2 size by 2 size
     # has a variance of size^2 / 3 along each of its two sides.
     size = max(_SMALLEST_SIZE, math.sqrt(max(0.0, 1.5 * (1.0 - dot(mean, mean)))))
     for i in range(3):
-        light[i * PATCHES + patch] = mean[0] * frame[0, i] + mean[1] * frame[1, i] + mean[2] * frame[2, i]
+        light[i * PATCHES + patch] = mean[i]
     light[LIGHT + patch] = total / (4.0 * size)
     light[SIZE + patch] = size
 
 
 @kernel
-def _frame(r_n: Vec3, sun_n: Vec3):
+def upright_frame(r_n: Vec3, sun_n: Vec3) -> tuple[Vec3, Vec3, Vec3]:
     """Up, the horizontal direction toward the Sun, and the one across it."""
     up = unit(r_n)
     x = subtract(sun_n, scale(dot(sun_n, up), up))

@@ -4,12 +4,14 @@
 The simulated truth builds one with the truth's parameters, flight software one with the flight's own.
 """
 
+import math
 from functools import lru_cache
 
 from css_common.epochs import parse_utc
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_environment import ephemeris
+from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.magnetic_field import HIGHEST_DEGREE
@@ -17,11 +19,31 @@ from css_environment.orbit import Orbit, TleOrbit, keplerian_orbit
 
 # Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
 _segment_tables = lru_cache(maxsize=4)(ephemeris.build_ephemeris)
+_arc = lru_cache(maxsize=4)(ballistic_arc)
+
+
+def mission_launch(values: Values) -> Launch:
+    """The start of a mission's ballistic arc (section orbit)."""
+    launch = values.orbit.launch
+    return Launch(
+        latitude=math.radians(launch.latitude_deg),
+        longitude=math.radians(launch.longitude_deg),
+        height=launch.height,
+        azimuth=math.radians(launch.azimuth_deg),
+        elevation=math.radians(launch.elevation_deg),
+        apogee=launch.apogee,
+    )
 
 
 def mission_orbit(values: Values) -> Orbit:
-    """The orbit of a mission's `orbit` section."""
+    """The orbit of a mission's `orbit` section, whose elements hold at the mission's epoch.
+
+    Raises:
+        ValueError: a ballistic arc does not reach its apogee.
+    """
     o = values.orbit
+    if o.source == "ballistic":
+        return _arc(mission_launch(values), parse_utc(values.mission.epoch))
     if o.source == "tle":
         return TleOrbit(o.tle_line1, o.tle_line2)
     return keplerian_orbit(

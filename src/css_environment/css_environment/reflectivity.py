@@ -15,6 +15,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4
+from css_common.vectors import Vec3
 from css_environment.time_scales import utc_date
 
 LOWEST, HIGHEST = 0.05, 1.0
@@ -125,6 +126,23 @@ def cell_at(x: float, y: float, z: float, rows: int, columns: int) -> int:
     row = int((_arc(math.sqrt(x * x + y * y), z) / math.pi + 0.5) * rows)
     column = int((_arc(x, y) / (2.0 * math.pi) + 0.5) * columns)
     return min(max(row, 0), rows - 1) * columns + min(max(column, 0), columns - 1)
+
+
+@kernel
+def reflectivity_at(reflectivity, direction_e: Vec3) -> float:
+    """Reflectivity in an Earth-fixed direction, a unit vector, interpolated in latitude between the grid's rows.
+
+    Args:
+        reflectivity: (rows, columns) grid.
+    """
+    rows, columns = reflectivity.shape
+    x, y, z = direction_e
+    in_rows = (_arc(math.sqrt(x * x + y * y), z) / math.pi + 0.5) * rows - 0.5
+    column = cell_at(x, y, z, rows, columns) % columns
+    south = min(max(math.floor(in_rows), 0), rows - 1)
+    north = min(south + 1, rows - 1)
+    part = min(max(in_rows - south, 0.0), 1.0)
+    return reflectivity[south, column] + part * (reflectivity[north, column] - reflectivity[south, column])
 
 
 @kernel

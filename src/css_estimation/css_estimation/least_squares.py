@@ -32,7 +32,7 @@ from css_estimation import snapshot, sun_tracking
 from css_estimation.cell_layout import brightest
 from css_estimation.lit_cells import lit_cells
 from css_estimation.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
-from css_estimation.sun_heading import NO_COVARIANCE, Covariance, SunHeading
+from css_estimation.sun_heading import NO_COVARIANCE, Aiding, Covariance, SunHeading
 from css_estimation.sun_patterns import NO_PATTERNS, find_pattern, sun_patterns
 from css_estimation.sun_tracking import TrackingState
 from css_estimation.sunline_filter import constrain
@@ -202,11 +202,10 @@ def step(
     state: TrackingState,
     dt: float,
     voltages,
-    gyro_b: Vec3,
-    gyro_valid: bool,
+    aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun_heading`."""
     top = brightest(voltages)
     seen = least_squares(p, voltages, top)
-    return finish_snapshot(p.snapshot, state, dt, voltages, top, gyro_b, gyro_valid, eclipse_predicted, seen)
+    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)

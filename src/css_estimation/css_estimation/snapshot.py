@@ -8,8 +8,9 @@ from css_common.schema import Table, Values, flag
 from css_common.vectors import Vec3
 from css_estimation import lit_cells, sun_tracking
 from css_estimation.cell_layout import CellLayout, cell_layout
+from css_estimation.eclipse_detector import detect_eclipse
 from css_estimation.lit_cells import Gate
-from css_estimation.sun_heading import VALIDITY_NONE, VALIDITY_VALID, Covariance, SunHeading
+from css_estimation.sun_heading import VALIDITY_NONE, VALIDITY_VALID, Aiding, Covariance, SunHeading
 from css_estimation.sun_tracking import (
     Estimate,
     TrackingParameters,
@@ -64,8 +65,7 @@ def finish_snapshot(
     dt: float,
     voltages,
     top: int,
-    gyro_b: Vec3,
-    gyro_valid: bool,
+    aiding: Aiding,
     eclipse_predicted: int,
     snapshot: Snapshot,
 ) -> tuple[TrackingState, SunHeading]:
@@ -76,14 +76,15 @@ def finish_snapshot(
         others: as in `css_estimation.sun_heading`.
     """
     dt = elapsed(dt)
-    gyro_ok = gyro_usable(p.tracking, gyro_b, gyro_valid)
+    gyro_ok = gyro_usable(p.tracking, aiding)
     valid = snapshot.mode != MODE_NO_SUN
     sun_b = snapshot.sun_b
     if not valid and state.validity != VALIDITY_NONE:
         sun_b = state.sun_b
         if p.propagate_held and gyro_ok:
-            sun_b = turned_sun(sun_b, gyro_b, dt)
+            sun_b = turned_sun(sun_b, aiding.gyro_b, dt)
     restarted = state.validity != VALIDITY_VALID
-    estimate = Estimate(sun_b, snapshot.covariance, valid, restarted, 0.0, 0, snapshot.lit_mask, snapshot.mode)
+    estimate = Estimate(sun_b, snapshot.covariance, valid, False, restarted, 0.0, 0, snapshot.lit_mask, snapshot.mode)
     largest = voltages[top] if top >= 0 else 0.0
-    return finish_cycle(p.tracking, state, dt, largest, gyro_b, gyro_ok, eclipse_predicted, estimate)
+    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, eclipse_predicted)
+    return finish_cycle(p.tracking, state, dt, aiding, gyro_ok, shadow, estimate)

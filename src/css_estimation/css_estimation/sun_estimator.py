@@ -1,33 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """A Sun estimator as a component of the graph; a node file only names the algorithm."""
 
+from collections.abc import Mapping
 from types import ModuleType
 from typing import ClassVar
 
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_estimation.eclipse_prediction import EclipsePrediction
-from css_estimation.messages import gyro_reading, sun_estimate_fields
-from css_estimation.sun_heading import PREDICTION_UNKNOWN
+from css_estimation.messages import field_reading, gyro_reading, sun_estimate_fields
+from css_estimation.mode_log import ModeLog
+from css_estimation.sun_heading import PREDICTION_UNKNOWN, Aiding
 from css_msgs.msg import CssVoltages, SunEstimate
 
 
 class SunEstimator(Component):
-    """Cell outputs and, while it delivers, the gyro in; `<node name>/sun_estimate` out.
+    """Cell outputs and, while they deliver, gyro and magnetometer in; `<node name>/sun_estimate` out.
 
     Class attributes:
         algorithm: module of the shape that `css_estimation.sun_heading` describes.
+        mode_names: names of its modes, if changes between them are worth a line in the log.
     """
 
-    shared = ("cells", "orbit")
+    shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "magnetometer")
     algorithm: ClassVar[ModuleType]
+    mode_names: ClassVar[Mapping[int, str]] = {}
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
-        return (
+        inputs = [
             Input(
                 "cells",
                 "css/voltages",
@@ -35,7 +39,19 @@ class SunEstimator(Component):
                 lengths={"voltages": len(values.cells.normals)},
             ),
             Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
-        )
+        ]
+        if values.rate.use_field:
+            inputs.append(
+                Input(
+                    "field",
+                    "mag/field",
+                    MagneticField,
+                    required=False,
+                    divider=values.magnetometer.divider,
+                    used=("magnetic_field",),
+                )
+            )
+        return tuple(inputs)
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
@@ -46,6 +62,7 @@ class SunEstimator(Component):
         self._state = self.algorithm.initial_state(self._parameters)
         self._step = typed_call(self.algorithm.step)
         self._last_stamp_ns: int | None = None
+        self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
         sensors_decide = self.values.eclipse.source == "sensors"
         self._prediction = None if sensors_decide else EclipsePrediction(self.values)
 
@@ -58,15 +75,18 @@ class SunEstimator(Component):
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
-        gyro_b, gyro_valid = gyro_reading(received["gyro"])
+        aiding = Aiding(*gyro_reading(received["gyro"]), *field_reading(received.get("field")))
         predicted = PREDICTION_UNKNOWN if self._prediction is None else self._prediction.at(stamp_ns)
         self._state, heading = self._step(
             self._parameters,
             self._state,
             since_ns / 1e9,
             cells.voltages,
-            gyro_b,
-            gyro_valid,
+            aiding,
             predicted,
         )
+        if self._mode_log is not None:
+            line = self._mode_log.line(stamp_ns, heading.mode)
+            if line is not None:
+                self.report(line)
         return {"estimate": self.message("estimate", stamp_ns, **sun_estimate_fields(heading))}

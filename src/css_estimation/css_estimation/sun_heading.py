@@ -3,11 +3,11 @@
 
 A Sun estimator is a module with a `PARAMETERS` table, `parameters(values)`, `initial_state(p)` and the kernel
 
-    step(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted) -> (state, SunHeading)
+    step(p, state, dt, voltages, aiding, eclipse_predicted) -> (state, SunHeading)
 
-with `dt` [s] since the last step, `voltages` (N,) [-], `gyro_b` [rad/s], `gyro_valid` a bool and
-`eclipse_predicted` one of the `PREDICTION_*` constants. Node, replay and Monte Carlo need nothing else of it. What
-`parameters` returns is a NamedTuple that the module itself defines: by its type the Monte Carlo finds the module.
+with `dt` [s] since the last step, `voltages` (N,) [-], `aiding` an `Aiding` and `eclipse_predicted` one of the
+`PREDICTION_*` constants. Node, replay and Monte Carlo need nothing else of it. What `parameters` returns is a
+NamedTuple that the module itself defines: by its type the Monte Carlo finds the module.
 """
 
 from typing import NamedTuple
@@ -38,10 +38,23 @@ Covariance = tuple[float, float, float, float, float, float, float, float, float
 NO_COVARIANCE: Covariance = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Aiding(NamedTuple):
+    """What other sensors measured in this cycle."""
+
+    gyro_b: Vec3  # [rad/s] body rate
+    gyro_valid: bool
+    field_b: Vec3  # [T] geomagnetic field
+    field_valid: bool  # measured in this very cycle; False while the next measurement is not due
+
+
+UNAIDED = Aiding((0.0, 0.0, 0.0), False, (0.0, 0.0, 0.0), False)
+"""No other sensor."""
+
+
 class SunHeading(NamedTuple):
     """Direction to the Sun and body rate after one cycle of an estimator; see css_msgs/SunEstimate."""
 
-    sun_b: Vec3  # [-] unit vector, zeros while there has been no estimate
+    sun_b: Vec3  # [-] unit vector; without an estimate (VALIDITY_NONE) zeros, or what the estimator then stands in
     covariance: Covariance  # [-] of sun_b; first element -1: not estimated
     omega_bn_b: Vec3  # [rad/s] low-pass filtered body rate
     age: float  # [s] since a cell last contributed

@@ -27,9 +27,10 @@ from css_common.schema import Table, Values, choice, real
 from css_common.vectors import Vec3
 from css_estimation import sun_tracking
 from css_estimation.cell_layout import READABLE, CellLayout, brightest, cell_layout, sees
+from css_estimation.eclipse_detector import detect_eclipse
 from css_estimation.lit_cells import Gate
 from css_estimation.snapshot import MODE_NO_SUN
-from css_estimation.sun_heading import NO_COVARIANCE, RATE_NONE, SunHeading
+from css_estimation.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun_tracking import (
     Estimate,
     TrackingParameters,
@@ -176,13 +177,12 @@ def step(
     state: EkfState,
     dt: float,
     voltages,
-    gyro_b: Vec3,
-    gyro_valid: bool,
+    aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[EkfState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun_heading`."""
     dt = elapsed(dt)
-    gyro_ok = gyro_usable(p.tracking, gyro_b, gyro_valid)
+    gyro_ok = gyro_usable(p.tracking, aiding)
     top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0
     lit = largest > p.gate.minimum_output
@@ -193,7 +193,7 @@ def step(
     covariance = state.covariance
     rate_known = gyro_ok or tracking.rate_source != RATE_NONE
     if started:
-        rate = gyro_b if gyro_ok and not p.propagate_filtered else tracking.omega_bn_b
+        rate = aiding.gyro_b if gyro_ok and not p.propagate_filtered else tracking.omega_bn_b
         noise = p.process_noise if rate_known else p.process_noise_without_rate
         sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
 
@@ -223,11 +223,13 @@ def step(
         sun_b,
         row_major(covariance) if started else NO_COVARIANCE,
         lit and started,
+        False,
         restarted,
         nis,
         count,
         mask,
         mode,
     )
-    tracking, heading = finish_cycle(p.tracking, tracking, dt, largest, gyro_b, gyro_ok, eclipse_predicted, estimate)
+    shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, eclipse_predicted)
+    tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)
     return EkfState(started, covariance, tracking), heading

@@ -3,7 +3,7 @@
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, cross, dot, matmul, norm, scale, transpose
-from css_estimation.symmetric import Symmetric, add_outer, isotropic, subtract_pair
+from css_estimation.symmetric import Symmetric, add_outer, congruence, isotropic, product, subtract_pair
 
 LEAST_SINE = 0.1
 """Sine of the angle between the directions below which they are too close to one line to give an attitude."""
@@ -44,3 +44,28 @@ def triad_covariance(primary_b: Vec3, secondary_b: Vec3, primary_sigma: float, s
     first, second = primary_sigma * primary_sigma, secondary_sigma * secondary_sigma
     p = subtract_pair(isotropic(first), w1, scale(-first * dot(w1, w2) * inverse, w2))
     return add_outer(p, (second - first) * inverse, w1)
+
+
+@kernel
+def triad_covariance_of(primary_b: Vec3, secondary_b: Vec3, primary: Symmetric, secondary: Symmetric) -> Symmetric:
+    """Covariance of the attitude error (rotation vector in b) [rad^2] of `triad`, for directions of any covariance.
+
+    To first order in the errors e1, e2 of the directions, with t2 = unit(w1 x w2) and g the angle between them, the
+    attitude errs by w1 x e1 + w1 (e2.t2 - cos g e1.t2) / sin g; for errors alike in all directions this is
+    `triad_covariance`.
+
+    Args:
+        primary, secondary: covariance of each unit vector in b [rad^2].
+    """
+    w1 = primary_b
+    across = cross(w1, secondary_b)
+    sine, cosine = norm(across), dot(w1, secondary_b)
+    t2 = scale(1.0 / sine, across)
+    lever = scale(-cosine / sine, t2)
+    jacobian = (
+        (w1[0] * lever[0], w1[0] * lever[1] - w1[2], w1[0] * lever[2] + w1[1]),
+        (w1[1] * lever[0] + w1[2], w1[1] * lever[1], w1[1] * lever[2] - w1[0]),
+        (w1[2] * lever[0] - w1[1], w1[2] * lever[1] + w1[0], w1[2] * lever[2]),
+    )
+    about = dot(t2, product(secondary, t2)) / (sine * sine)
+    return add_outer(congruence(jacobian, primary), about, w1)

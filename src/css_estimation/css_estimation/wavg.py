@@ -17,7 +17,7 @@ from css_estimation import snapshot, sun_tracking
 from css_estimation.cell_layout import CellLayout, brightest
 from css_estimation.lit_cells import Gate, lit_cells
 from css_estimation.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
-from css_estimation.sun_heading import NO_COVARIANCE, SunHeading
+from css_estimation.sun_heading import NO_COVARIANCE, Aiding, SunHeading
 from css_estimation.sun_tracking import TrackingState
 
 PARAMETERS: Table = snapshot.PARAMETERS
@@ -79,12 +79,11 @@ def step(
     state: TrackingState,
     dt: float,
     voltages,
-    gyro_b: Vec3,
-    gyro_valid: bool,
+    aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun_heading`."""
     top = brightest(voltages)
     sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
     seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)
-    return finish_snapshot(p.snapshot, state, dt, voltages, top, gyro_b, gyro_valid, eclipse_predicted, seen)
+    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from sensor_msgs.msg import Imu
+from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
 from css_common.schema import checked_values, shaped_values
@@ -13,7 +13,7 @@ from css_estimation.messages import gyro_reading
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.nodes.wavg import Wavg
 from css_estimation.nodes.wls import Wls
-from css_estimation.sun_heading import RATE_GYRO, RATE_SUN
+from css_estimation.sun_heading import RATE_FIELD, RATE_GYRO, RATE_SUN
 from css_msgs.msg import CssVoltages, SunEstimate
 
 KINDS = pytest.mark.parametrize("kind", [Wavg, Wls, Ekf])
@@ -38,6 +38,15 @@ def imu(stamp_ns, off=False):
     covariance = np.zeros(9)
     covariance[0] = -1.0 if off else 1e-8
     return codec_of(Imu).sample(stamp_ns, "bus", angular_velocity=OMEGA.copy(), angular_velocity_covariance=covariance)
+
+
+def field_of(stamp_ns, off=False):
+    covariance = np.zeros(9)
+    covariance[0] = -1.0 if off else 1e-15
+    field_b = np.array([3e-5, -1e-5, 0.0])
+    return codec_of(MagneticField).sample(
+        stamp_ns, "bus", magnetic_field=field_b, magnetic_field_covariance=covariance
+    )
 
 
 def run(component, steps, start=0, off=False, voltages=LIT):
@@ -68,6 +77,26 @@ def test_topics(kind):
     (output,) = kind.outputs("left", values)
     assert output.topic == "left/sun_estimate"
     assert output.ends_cycle
+
+
+@KINDS
+def test_the_field_is_an_input_when_it_may_be_used(kind):
+    values = values_of(kind, rate__use_field=True, magnetometer__divider=5)
+    *_, field = kind.inputs("sun", values)
+    assert (field.topic, field.required, field.divider) == ("mag/field", False, 5)
+
+
+@KINDS
+def test_a_magnetometer_that_says_off_and_a_silent_one_are_the_same(kind):
+    off, silent, measuring = (build(kind, rate__use_field=True, use_gyro=False) for _ in range(3))
+    for k in range(20):
+        stamp_ns = off.epoch_ns + k * off.period_ns
+        received = {"cells": cells(stamp_ns, LIT * (1.0 - 0.01 * k)), "gyro": None}
+        a = off.cycle(stamp_ns, received | {"field": field_of(stamp_ns, off=True)})["estimate"]
+        b = silent.cycle(stamp_ns, received | {"field": None})["estimate"]
+        c = measuring.cycle(stamp_ns, received | {"field": field_of(stamp_ns)})["estimate"]
+        assert codec_of(SunEstimate).encode(a) == codec_of(SunEstimate).encode(b)
+    assert (a.rate_source, c.rate_source) == (RATE_SUN, RATE_FIELD)
 
 
 @KINDS

@@ -11,13 +11,14 @@ from hypothesis import strategies as st
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_estimation import least_squares, sunline_ekf, wavg
-from css_estimation.sun_heading import VALIDITY_NONE, VALIDITY_VALID
+from css_estimation.sun_heading import UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
 
 ESTIMATORS = pytest.mark.parametrize(
     ("estimator", "options"),
     [(wavg, {}), (least_squares, {}), (least_squares, {"use_dark_cells": True}), (sunline_ekf, {})],
     ids=["wavg", "wls", "wls with dark cells", "ekf"],
 )
+TURNING = UNAIDED._replace(gyro_b=(0.0, 0.0, 0.01), gyro_valid=True)
 rng = np.random.default_rng(7)
 
 
@@ -53,10 +54,16 @@ outputs = st.one_of(
     st.just(0.0), st.floats(-0.1, 1.2), st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.5, 1.0])
 )
 rates = st.one_of(st.floats(-0.2, 0.2), st.floats(allow_nan=True, allow_infinity=True))
+fields = st.one_of(st.floats(-6e-5, 6e-5), st.floats(allow_nan=True, allow_infinity=True))
 cycle = st.tuples(
     st.lists(outputs, min_size=32, max_size=32),
-    st.tuples(rates, rates, rates),
-    st.booleans(),
+    st.builds(
+        Aiding,
+        st.tuples(rates, rates, rates),
+        st.booleans(),
+        st.tuples(fields, fields, fields),
+        st.booleans(),
+    ),
     st.one_of(st.sampled_from([0.1, 0.0, 1e-9, 1.0, 3600.0]), st.floats(allow_nan=True, allow_infinity=True)),
     st.sampled_from([-1, 0, 1]),
 )
@@ -64,11 +71,11 @@ cycle = st.tuples(
 
 @ESTIMATORS
 @settings(max_examples=150, deadline=None)
-@given(cycles=st.lists(cycle, min_size=1, max_size=12), count=st.sampled_from([1, 2, 8, 32]))
-def test_any_sequence(estimator, options, cycles, count):
-    p, state = build(estimator, count, eclipse__source="both", **options)
-    for voltages, gyro_b, gyro_valid, dt, predicted in cycles:
-        state, heading = estimator.step(p, state, dt, np.array(voltages[:count]), gyro_b, gyro_valid, predicted)
+@given(cycles=st.lists(cycle, min_size=1, max_size=12), count=st.sampled_from([1, 2, 8, 32]), use_field=st.booleans())
+def test_any_sequence(estimator, options, cycles, count, use_field):
+    p, state = build(estimator, count, eclipse__source="both", rate__use_field=use_field, **options)
+    for voltages, aiding, dt, predicted in cycles:
+        state, heading = estimator.step(p, state, dt, np.array(voltages[:count]), aiding, predicted)
         assert_sane(heading)
 
 
@@ -78,7 +85,7 @@ def test_any_sequence(estimator, options, cycles, count):
 def test_all_outputs_equal(estimator, options, count, level):
     p, state = build(estimator, count, **options)
     for _ in range(50):
-        state, heading = estimator.step(p, state, 0.1, np.full(count, level), (0.0, 0.0, 0.01), True, -1)
+        state, heading = estimator.step(p, state, 0.1, np.full(count, level), TURNING, -1)
         assert_sane(heading)
     assert (heading.validity == VALIDITY_VALID) == (0.5 <= level < 1e100)
 
@@ -90,7 +97,7 @@ def test_one_dead_reading_costs_one_cell(estimator, options):
     voltages = np.maximum(np.array(LAYOUTS[8]).reshape(8, 3) @ (0.0, 0.6, 0.8), 0.0)
     voltages[np.argmin(voltages)] = math.nan
     for _ in range(100):
-        state, heading = estimator.step(p, state, 0.1, voltages, (0.0, 0.0, 0.0), True, -1)
+        state, heading = estimator.step(p, state, 0.1, voltages, UNAIDED, -1)
     assert heading.validity == VALIDITY_VALID
     assert_sane(heading)
     assert np.dot(heading.sun_b, (0.0, 0.6, 0.8)) > math.cos(math.radians(60.0))
@@ -99,5 +106,5 @@ def test_one_dead_reading_costs_one_cell(estimator, options):
 @ESTIMATORS
 def test_32_cells_use_the_whole_mask(estimator, options):
     p, state = build(estimator, 32, **options)
-    _, heading = estimator.step(p, state, 0.1, np.ones(32), (0.0, 0.0, 0.0), True, -1)
+    _, heading = estimator.step(p, state, 0.1, np.ones(32), UNAIDED, -1)
     assert heading.lit_mask == 2**32 - 1

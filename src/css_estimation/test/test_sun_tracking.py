@@ -15,6 +15,7 @@ from css_estimation.sun_heading import (
     RATE_GYRO,
     RATE_NONE,
     RATE_SUN,
+    UNAIDED,
     VALIDITY_HELD,
     VALIDITY_NONE,
     VALIDITY_VALID,
@@ -40,7 +41,8 @@ class Flight:
         cosines = NORMALS @ self.sun_b
         seen = (cosines >= 0.5 - 1e-12) & (NORMALS[:, 2] * self.sun_b[2] > 0.0)
         voltages = np.where(seen, cosines, 0.0) * lit
-        self.state, heading = self.estimator.step(self.p, self.state, DT, voltages, omega, gyro, -1)
+        aiding = UNAIDED._replace(gyro_b=omega, gyro_valid=gyro)
+        self.state, heading = self.estimator.step(self.p, self.state, DT, voltages, aiding, -1)
         return heading
 
     def fly(self, steps, **conditions):
@@ -79,7 +81,8 @@ def test_gyro_is_ignored_when_it_may_not_be_used(estimator):
 def test_a_gyro_reading_that_is_none_counts_as_off(estimator, reading):
     flight = Flight(estimator)
     flight.fly(2)
-    flight.state, heading = estimator.step(flight.p, flight.state, DT, np.ones(8), reading, True, -1)
+    aiding = UNAIDED._replace(gyro_b=reading, gyro_valid=True)
+    flight.state, heading = estimator.step(flight.p, flight.state, DT, np.ones(8), aiding, -1)
     assert heading.rate_source != RATE_GYRO
     assert all(map(math.isfinite, (*heading.sun_b, *heading.omega_bn_b)))
 

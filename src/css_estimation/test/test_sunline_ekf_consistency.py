@@ -18,6 +18,7 @@ from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between, multiply, scale
 from css_estimation import sunline_ekf
+from css_estimation.sun_heading import UNAIDED
 
 RUNS = 60
 STEPS = 300
@@ -30,6 +31,10 @@ NORMALS = np.asarray(default_values(CELLS).cells.normals)
 def ekf(**changes):
     p = sunline_ekf.parameters(default_values(CELLS + sunline_ekf.PARAMETERS, **changes))
     return p, sunline_ekf.initial_state(p)
+
+
+def with_gyro(omega):
+    return UNAIDED._replace(gyro_b=omega, gyro_valid=True)
 
 
 def rate_at(t):
@@ -60,7 +65,7 @@ def fly_ideal(seed):
         # q dt of the filter is the variance of the angle that the rate noise adds in a step
         measured = tuple(np.add(omega, PROCESS_SIGMA / math.sqrt(DT) * rng.normal(size=3)).tolist())
         outputs = NORMALS @ sun_b + CELL_SIGMA * rng.normal(size=8)
-        state, heading = sunline_ekf.step(p, state, DT, outputs, measured, True, -1)
+        state, heading = sunline_ekf.step(p, state, DT, outputs, with_gyro(measured), -1)
         helper = np.eye(3)[np.argmin(np.abs(heading.sun_b))]
         e1 = np.cross(heading.sun_b, helper)
         e1 /= np.linalg.norm(e1)
@@ -131,7 +136,7 @@ def test_tracks_a_turning_sun_that_one_or_two_cells_see():
     for _ in range(1200):
         sun_b = turned(sun_b, omega)
         outputs = cell_outputs(sun_b)
-        state, heading = sunline_ekf.step(p, state, DT, outputs, omega, True, -1)
+        state, heading = sunline_ekf.step(p, state, DT, outputs, with_gyro(omega), -1)
         errors.append(angle_between(heading.sun_b, sun_b))
         lit.append(np.count_nonzero(outputs))
     assert max(lit) <= 2
@@ -147,7 +152,7 @@ def test_without_gyro_it_converges_once_more_cells_see_the_sun():
     for _ in range(1200):
         sun_b = turned(sun_b, omega)
         outputs = cell_outputs(sun_b)
-        state, heading = sunline_ekf.step(p, state, DT, outputs, (0.0, 0.0, 0.0), False, -1)
+        state, heading = sunline_ekf.step(p, state, DT, outputs, UNAIDED, -1)
         few = np.count_nonzero(outputs) <= 2
         error = angle_between(heading.sun_b, sun_b)
         if not few and error < math.radians(2.0):
@@ -173,5 +178,5 @@ def test_finds_the_sun_from_a_wrong_start(seed):
     )
     for _ in range(900):
         sun_b = turned(sun_b, omega)
-        state, heading = sunline_ekf.step(p, state, DT, cell_outputs(sun_b), omega, True, -1)
+        state, heading = sunline_ekf.step(p, state, DT, cell_outputs(sun_b), with_gyro(omega), -1)
     assert angle_between(heading.sun_b, sun_b) < math.radians(8.0)

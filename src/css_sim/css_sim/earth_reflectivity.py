@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reflectivity of the Earth that a mission asks for: which model or file, and whether a case draws its own."""
+"""Light of the Earth that a mission asks for: which model, which reflectivity, and whether a case draws its own."""
 
 from collections.abc import Iterator
 
@@ -17,6 +17,12 @@ from css_environment.reflectivity import (
 
 PARAMETERS: Table = (
     flag("albedo.enabled", True, "light that the Earth reflects onto the cells (O'Keefe & Schaub 2013, Eq. 17)"),
+    choice(
+        "albedo.model",
+        "patches",
+        ("patches", "vector", "nadir"),
+        "light of the visible sunlit Earth by patches, as one vector (Benton), or constant from nadir",
+    ),
     choice(
         "albedo.reflectivity",
         "zonal",
@@ -63,6 +69,8 @@ def case_reflectivity(values: Values, grid: Reflectivity, key: RandomKey) -> np.
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
     albedo = values.albedo
+    if albedo.model == "nadir" and albedo.reflectivity != "constant":
+        yield f"albedo.reflectivity: {albedo.reflectivity} given, but light from nadir is constant; expected constant"
     if albedo.reflectivity == "file":
         if not albedo.mean_file:
             yield "albedo.mean_file: missing, expected a file because albedo.reflectivity is file"

@@ -10,6 +10,8 @@ from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
 from css_sim.nodes.magnetometer import Magnetometer
+from css_sim.nodes.rocket import Rocket
+from css_sim.nodes.slit_sensor import SlitSensor
 
 README = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
 
@@ -22,7 +24,7 @@ def rows(text):
 
 
 SECTIONS = {part.split("\n", 1)[0].strip(): rows(part) for part in README.split("### ")[1:]}
-COMPONENTS = (Dynamics, CssArray, Gyro, Magnetometer)
+COMPONENTS = (Dynamics, CssArray, Gyro, Magnetometer, Rocket, SlitSensor)
 
 
 @pytest.mark.parametrize("kind", COMPONENTS)

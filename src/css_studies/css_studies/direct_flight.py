@@ -5,16 +5,16 @@ Sample sensors, estimate, control, propagate: the order follows from who listens
 same values as from its topics, so the flight is the same as that of the composed graph.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from css_common.codec import Sample, codec_of
-from css_common.component import Outgoing, Plant
+from css_common.component import Outgoing, Plant, messages_of
 from css_common.mission import Event, Mission, MissionError, Node
-from css_common.schema import shaped_values
-from css_studies.flight_log import FlightLog
+from css_common.schema import shaped_values, unknown_name
+from css_studies.flight_log import LOGGED_TYPES, FlightLog
 from css_studies.message_columns import Columns
 
 
@@ -47,9 +47,36 @@ def fly_directly(mission: Mission) -> FlightLog:
     Raises:
         MissionError: the mission has no plant, or its nodes wait for each other in a circle.
     """
-    *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     steps = max(mission.steps, 1)
-    wires = {topic: _Wire(message_type, steps) for topic, message_type in mission.topics.items()}
+    wires: dict[str, _Wire | _Tape] = {
+        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=False)
+        for topic, kind in mission.topics.items()
+    }
+    _fly(mission, wires)
+    log = FlightLog(f"{mission.name}_{mission.values.mission.case}", mission)
+    for topic, wire in wires.items():
+        if isinstance(wire, _Wire):
+            log.add(f"/{topic}", mission.topics[topic], wire.columns())
+    return log
+
+
+def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Sample]]:
+    """Flies a mission to its end; gives all messages of some topics, of any type.
+
+    Raises:
+        MissionError: the mission has no plant or not these topics, or its nodes wait for each other in a circle.
+    """
+    kept = list(topics)
+    for topic in kept:
+        if topic not in mission.topics:
+            raise MissionError(f"{mission.origin}: topic {unknown_name(topic, mission.topics)}")
+    wires = {topic: _Tape(kind, keep=topic in kept) for topic, kind in mission.topics.items()}
+    _fly(mission, wires)
+    return {topic: wires[topic].samples for topic in kept}
+
+
+def _fly(mission: Mission, wires: "Wires") -> None:
+    *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
     plant.apply_events(stamp_ns)
     clockwork = plant.component
@@ -63,10 +90,6 @@ def fly_directly(mission: Mission) -> FlightLog:
         outgoing = plant.component.cycle(stamp_ns, plant.received(bus))
         stamp_ns += mission.period_ns
         plant.apply_events(stamp_ns)
-    log = FlightLog(f"{mission.name}_{mission.values.mission.case}", mission)
-    for topic, message_type in mission.topics.items():
-        log.add(f"/{topic}", message_type, wires[topic].columns())
-    return log
 
 
 class _Wire:
@@ -108,7 +131,28 @@ class _Wire:
             self._columns.append((field.name, np.zeros(shape, field.dtype), field.count is not None))
 
 
-Wires = Mapping[str, _Wire]
+class _Tape:
+    """One topic whose messages are handed on as they are, and kept when they are asked for."""
+
+    def __init__(self, message_type: type, keep: bool) -> None:
+        self._fields = codec_of(message_type).fields
+        self._keep = keep
+        self.samples: list[Sample] = []
+
+    def carry(self, sample: Sample) -> Sample:
+        """The message as a listener gets it."""
+        heard = Sample(sample.stamp_ns, sample.frame_id)
+        for field in self._fields:
+            value = getattr(sample, field.name)
+            # a sender may reuse its arrays
+            heard.__dict__[field.name] = value if field.count is None else np.array(value, field.dtype).ravel()
+        if self._keep:
+            self.samples.append(heard)
+        return heard
+
+
+Wires = Mapping[str, _Wire | _Tape]
+_LOGGED = frozenset(LOGGED_TYPES.values())
 
 
 class _Part:
@@ -140,7 +184,7 @@ class _Part:
 
     def publish(self, outgoing: Outgoing, wires: Wires, bus: dict[str, Sample]) -> None:
         """Send what a component gave."""
-        for key, sample in outgoing.items():
+        for key, sample in messages_of(outgoing):
             topic = self._topics[key]
             bus[topic] = wires[topic].carry(sample)
 

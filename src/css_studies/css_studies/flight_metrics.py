@@ -35,6 +35,8 @@ QUANTITIES = {
     "attitude_error_p95_deg": "95th percentile of the same angle [deg]",
     "attitude_nees": "mean normalised error squared of the attitude, 3 if the filter is consistent, from 300 s on",
     "pointing_error_mean_deg": "mean angle [deg] of array normal to true Sun, sunlit, after acquisition",
+    "pointing_error_sunlit_deg": "the same over all sunlit steps [deg], those before acquisition included",
+    "heading_error_sunlit_deg": "mean angle [deg] of estimated to true Sun over all sunlit steps with an estimate",
     "rate_final_deg_s": "mean norm of the true body rate [deg/s] over the last 60 s",
     "steps_without_estimate": "sunlit steps of the flight at which the estimator had none",
 }
@@ -44,7 +46,7 @@ QUANTITIES = {
 def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: str | None = None) -> list[Run]:
     """What each estimator of a flight achieved: one dictionary with `QUANTITIES`, estimator, gyro and flown.
 
-    `power_positive_s`, `pointing_error_mean_deg` and `rate_final_deg_s` belong to the flight: an estimator
+    `power_positive_s`, the pointing errors and `rate_final_deg_s` belong to the flight: an estimator
     that was replayed or flew beside has those of the one that controlled.
 
     Args:
@@ -62,6 +64,8 @@ def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: st
             **_heading_quantities(log, name),
             **_attitude_quantities(log, name),
             "pointing_error_mean_deg": flight["pointing_error_mean_deg"],
+            "pointing_error_sunlit_deg": flight["pointing_error_sunlit_deg"],
+            "heading_error_sunlit_deg": _heading_error_sunlit(log, name),
             "rate_final_deg_s": flight["rate_final_deg_s"],
             "steps_without_estimate": _steps_without_estimate(log, name),
         }
@@ -108,7 +112,9 @@ def sunlit_passes(log: FlightLog) -> list[Pass]:
 
 def _flight_quantities(log: FlightLog) -> Run:
     if log.truth is None:
-        return {"power_positive_s": None, "pointing_error_mean_deg": None, "rate_final_deg_s": None}
+        return dict.fromkeys(
+            ("power_positive_s", "pointing_error_mean_deg", "pointing_error_sunlit_deg", "rate_final_deg_s")
+        )
     away = log.pointing_error > POWER_POSITIVE
     start = acquisition(log)
     counted = _counted(log, start)
@@ -118,6 +124,7 @@ def _flight_quantities(log: FlightLog) -> Run:
         if np.any(~away & log.sunlit)
         else None,
         "pointing_error_mean_deg": _mean_deg(log.pointing_error[counted]),
+        "pointing_error_sunlit_deg": _mean_deg(log.pointing_error[log.sunlit]),
         "rate_final_deg_s": _mean_deg(log.rate[time > time[-1] - FINAL_TIME + 0.01 * log.period]),
     }
 
@@ -130,6 +137,13 @@ def _heading_quantities(log: FlightLog, name: str) -> Run:
         mean = _mean_deg(errors)
         p95 = float(np.degrees(np.percentile(errors, 95.0))) if len(errors) else None
     return {"heading_error_mean_deg": mean, "heading_error_p95_deg": p95}
+
+
+def _heading_error_sunlit(log: FlightLog, name: str) -> float | None:
+    if log.truth is None or name not in log.estimates:
+        return None
+    steps, errors = heading_errors(log, name)
+    return _mean_deg(errors[log.sunlit[steps]])
 
 
 def _attitude_quantities(log: FlightLog, name: str) -> Run:

@@ -34,6 +34,7 @@ def test_all_quantities_of_a_known_flight():
     log.truth.omega_bn_b[-steps(60.0) :, 1] = np.radians(0.25)
     (run,) = estimator_runs(log)
     counted = 200.0 + 20.0 + 130.0
+    after = 200.0 * 10.0 + 20.0 * 40.0 + 130.0 * 5.0
     assert run == {
         "estimator": "ekf",
         "gyro": "off",
@@ -44,7 +45,9 @@ def test_all_quantities_of_a_known_flight():
         "attitude_error_mean_deg": None,
         "attitude_error_p95_deg": None,
         "attitude_nees": None,
-        "pointing_error_mean_deg": pytest.approx((200.0 * 10.0 + 20.0 * 40.0 + 130.0 * 5.0) / counted),
+        "pointing_error_mean_deg": pytest.approx(after / counted),
+        "pointing_error_sunlit_deg": pytest.approx((100.0 * 90.0 + after) / (100.0 + counted)),
+        "heading_error_sunlit_deg": pytest.approx(3.0),
         "rate_final_deg_s": pytest.approx(0.25),
         "steps_without_estimate": 0,
     }
@@ -124,7 +127,8 @@ def test_flight_figures_belong_to_all_estimators():
     first, second = estimator_runs(log)
     assert (first["flown"], second["flown"]) == (True, False)
     assert first["gyro"] == "on", "by the parameter of the node"
-    for quantity in ("power_positive_s", "pointing_error_mean_deg", "rate_final_deg_s"):
+    of_the_flight = ("power_positive_s", "pointing_error_mean_deg", "pointing_error_sunlit_deg", "rate_final_deg_s")
+    for quantity in of_the_flight:
         assert first[quantity] == second[quantity]
     assert second["heading_error_mean_deg"] == pytest.approx(5.0)
     assert estimator_runs(log, flown="wavg")[1]["flown"]

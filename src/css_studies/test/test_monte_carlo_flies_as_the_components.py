@@ -4,8 +4,10 @@
 import numpy as np
 import pytest
 
-from css_common.mission import default_mission, mission_from_text
+from css_common.mission import default_mission, load_mission, mission_from_text
 from css_common.mission_file import MissionError
+from css_estimation.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
+from css_msgs.msg import SunEstimate
 from css_studies.direct_flight import fly_directly
 from css_studies.monte_carlo.chunk import fly_cases
 from css_studies.monte_carlo.mission_flight import MissionFlight
@@ -56,7 +58,7 @@ def same_steps(mission):
     trace = fly_cases(MissionFlight(mission), CASES, 10, traced=True).trace
     for case, flown in zip(CASES, trace, strict=True):
         log = fly_directly(mission.with_overrides([f"mission.case={case}"]))
-        truth, estimate = log.having("truth"), log.estimates["ekf"]
+        truth, estimate = log.having("truth"), log.estimates[mission.values.graph.estimator]
         torque, speed = log.having("torque_command").torque, log.having("wheels").speed
         expected = (truth.sigma_bn, truth.omega_bn_b, estimate.sun_b, estimate.omega_bn_b, torque, speed)
         np.testing.assert_array_equal(flown, np.hstack(expected))
@@ -67,6 +69,47 @@ def same_steps(mission):
 def test_every_step_is_the_same(variant):
     mission = default_mission().with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
     assert same_steps(mission) == 200
+
+
+# sunrise after two minutes, and gains that then find the Sun in one
+SUNRISE = (
+    "orbit.true_anomaly_deg=43.0",
+    "mission.duration=300.0",
+    "mrp_control.gains.k=0.148",
+    "mrp_control.gains.p=0.9",
+)
+CLARK = {
+    "flat cells": ("clark_1996_flat", (), {MODE_SHADOW, MODE_FLAT}),
+    "pyramid": ("clark_1996_pyramid", (), {MODE_SHADOW, MODE_FLAT, MODE_PYRAMID}),
+    "a slower magnetometer, dumping at all times": (
+        "clark_1996_pyramid",
+        ("magnetometer.divider=4", "mrp_control.dumping.when=always"),
+        {MODE_SHADOW, MODE_FLAT, MODE_PYRAMID},
+    ),
+    "light by patches": ("clark_1996_flat", ("css_array.albedo.model=patches",), {MODE_SHADOW, MODE_FLAT}),
+    "light from nadir": (
+        "clark_1996_flat",
+        ("css_array.albedo.model=nadir", "css_array.albedo.reflectivity=constant"),
+        {MODE_SHADOW, MODE_FLAT},
+    ),
+    "a vector of each case's own Earth": (
+        "clark_1996_flat",
+        ("css_array.albedo.reflectivity=zonal", "css_array.albedo.draw=per_cell"),
+        {MODE_SHADOW, MODE_FLAT},
+    ),
+}
+
+
+@pytest.mark.parametrize("variant", CLARK)
+def test_safe_hold_is_the_same_from_the_shadow_into_the_sun(variant):
+    name, overrides, modes = CLARK[variant]
+    mission = load_mission(name, [*SUNRISE, *overrides])
+    assert same_steps(mission) == 600
+    log = fly_directly(mission)
+    estimate = log.estimates[mission.values.graph.estimator]
+    assert modes <= set(estimate.mode.tolist())
+    assert SunEstimate.RATE_FIELD in estimate.rate_source
+    assert not log.sunlit[0] and log.sunlit[-1]
 
 
 def test_the_same_over_several_blocks_and_scripted_changes():

@@ -12,14 +12,15 @@ from css_common.mission import load_mission
 from css_studies.commands.reproduce import main
 from css_studies.monte_carlo import Configuration, Study, read_study
 from css_studies.reproduce.okeefe import paper
-from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION
-from css_studies.reproduce.okeefe.flight_figures import Variant
-from css_studies.reproduce.okeefe.flights import column, curve, merit, rate_error_before
+from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION, Entry
+from css_studies.reproduce.okeefe.flight_figures import Shadow, Variant
+from css_studies.reproduce.okeefe.flights import column, curve, merit
 from css_studies.reproduce.okeefe.numbers import flight_rows
 from css_studies.reproduce.page import Part
 
 ENGINE_QUANTITIES = {"heading error at the end", "rate at 50 min", "rate error at 50 min", "longest converging"}
 A, B = Configuration("wavg", True), Configuration("wavg", True, ("css_array.scale=0.8", "wavg.gate=0"))
+LIGHT = Shadow(np.array([0.0]), np.array([False]))
 GOOD = {
     "heading_error_late_deg": [4.5, 5.5, 5.0],
     "converging_s": [30.0, 90.0, 60.0],
@@ -27,6 +28,7 @@ GOOD = {
     "converging_later_s": [0.0, 60.0, 0.0],
     "acquired_s": [60.0, 120.0, 180.0],
     "rate_50min_deg_s": [0.01, 0.02, 0.0],
+    "rate_knowledge_50min_deg_s": [0.001, 0.002, 0.003],
 }
 
 
@@ -39,14 +41,14 @@ def rows_of(values, is_printed):
     """Rows of one configuration by quantity."""
     tables = case_table([A], 3, {A: values}), percentile_table([A], np.arange(0.0, 3600.0, 10.0))
     entry = AS_PRINTED[0]._replace(configuration=A)
-    return {row.quantity: row for row in flight_rows(Variant("improved", is_printed, [entry], *tables))}
+    return {row.quantity: row for row in flight_rows(Variant("improved", is_printed, [entry], *tables), LIGHT)}
 
 
 def test_figures_of_merit_of_one_configuration_among_several():
     m = merit(case_table([A, B], 3, {A: GOOD}), A)
     assert m.cases == 3 and m.converged_percent == 100.0
     assert m.heading_error_late_deg == pytest.approx(5.0)
-    assert m.rate_50min_deg_s == pytest.approx(0.01)
+    assert m.rate_50min_deg_s == pytest.approx(0.01) and m.rate_knowledge_50min_deg_s == pytest.approx(0.002)
     assert (m.converging_mean_min, m.converging_max_min) == (pytest.approx(1.0), pytest.approx(1.5))
     assert (m.converging_first_max_min, m.converging_later_max_min) == (pytest.approx(1.0), pytest.approx(1.0))
     assert m.acquired_mean_min == pytest.approx(2.0)
@@ -72,13 +74,17 @@ def test_overrides_tell_configurations_apart():
     np.testing.assert_allclose((line.time_s, line.mean, line.p95), (time_s, time_s + 2.0, 2.0 * time_s + 4.0))
 
 
-def test_where_no_rate_is_measured_the_last_minute_before_counts():
+def test_when_it_is_dark_at_fifty_minutes_the_note_tells_of_the_light_before():
     time_s = np.arange(0.0, 3600.0, 10.0)
-    dark = percentile_table([A], time_s, lambda c, q, t: np.where((t > 2000.0) & (t < 3300.0), np.nan, t))
-    assert rate_error_before(dark, A, 3000.0) == (pytest.approx(1975.0), 2000.0)
-    light = percentile_table([A], time_s, lambda c, q, t: t)
-    assert rate_error_before(light, A, 3000.0) == (pytest.approx(2975.0), 3000.0)
-    assert rate_error_before(percentile_table([A], time_s, lambda c, q, t: t * np.nan), A, 3000.0) is None
+    dark = Shadow(time_s, (time_s > 2000.0) & (time_s < 3300.0))
+    entry = Entry("average, no gyro", "black", Configuration("wavg", False))
+    tables = case_table([entry.configuration], 2), percentile_table([entry.configuration], time_s, lambda c, q, t: t)
+    variant = Variant("as the paper", True, [entry], *tables)
+    notes = {row.quantity: row.note for row in flight_rows(variant, dark)}
+    # the minute from 1910 to 1970 s, half a minute before the light ends
+    assert "at 33 min, it errs by 1945" in notes["average, no gyro: rate error at 50 min"]
+    light = Shadow(time_s, np.zeros(len(time_s), bool))
+    assert not any(row.note for row in flight_rows(variant, light))
 
 
 def test_the_improved_must_beat_what_is_printed():

@@ -17,12 +17,13 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, flag, real
+from css_common.schema import Table, Values, choice, flag, real
 from css_common.vectors import Vec3, add, axes_across, cross, dot, norm, row, scale, subtract, unit
 from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
 
 PARAMETERS: Table = (
     flag("dumping.enabled", False, "dump wheel momentum with the torque rods", tunable=True),
+    choice("dumping.when", "always", ("always", "eclipse"), "at all times, or in the shadow alone", tunable=True),
     real("dumping.gain", 0.005, "1/s", "despin gain c", low=0.0, high=10.0, tunable=True),
     real("dumping.reference_speed_rpm", 0.0, "rpm", "wheel speed to dump to", low=-1e5, high=1e5, tunable=True),
 )
@@ -37,6 +38,7 @@ class DumpingParameters(NamedTuple):
     """Built by `parameters`."""
 
     enabled: bool
+    in_eclipse_only: bool
     gain: float  # [1/s]
     reference_speed: float  # [rad/s]
     wheel_inertia: float  # [kg m^2]
@@ -48,6 +50,7 @@ def parameters(values: Values) -> DumpingParameters:
     """Parameters from checked values (`PARAMETERS` and the mission's `wheels` and `rods`)."""
     return DumpingParameters(
         enabled=values.dumping.enabled,
+        in_eclipse_only=values.dumping.when == "eclipse",
         gain=values.dumping.gain,
         reference_speed=values.dumping.reference_speed_rpm * _RPM,
         wheel_inertia=values.wheels.inertia,

@@ -226,7 +226,8 @@ def step(
     rods_saturated = 0
     dumping = False
     dipole_out[:] = 0.0
-    if p.dumping.enabled and field_valid and inputs_ok and mode != MODE_SAFE and _within(field_b, _LARGEST_FIELD):
+    allowed = mode == MODE_ECLIPSE or (mode != MODE_SAFE and not p.dumping.in_eclipse_only)
+    if p.dumping.enabled and allowed and field_valid and inputs_ok and _within(field_b, _LARGEST_FIELD):
         rods_saturated, dumping = add_dumping(p.dumping, p.allocation, wheel_speeds, field_b, torque_out, dipole_out)
     output = ControlOutput(
         torque_b,

@@ -129,6 +129,17 @@ def test_saturation_is_reported():
     assert np.abs(cycle.torques).max() == pytest.approx(0.030)
 
 
+def test_dumping_in_the_shadow_alone():
+    cycle = Cycle(dumping__enabled=True, dumping__when="eclipse", rods__fitted=True)
+    sample = {"speeds": (100.0, -50.0, 30.0, 10.0), "field": (2e-5, 1e-5, -3e-5), "field_valid": True}
+    assert not cycle.step(**sample).dumping
+    assert not np.any(cycle.dipoles)
+    for _ in range(3):
+        output = cycle.step(**sample, eclipse=1)
+    assert output.mode == MODE_ECLIPSE and output.dumping
+    assert np.any(cycle.dipoles)
+
+
 def test_dumping_adds_nothing_to_the_torque_on_the_body():
     plain, dumping = Cycle(), Cycle(dumping__enabled=True, rods__fitted=True)
     field = (1e-5, -2e-5, 3e-5)

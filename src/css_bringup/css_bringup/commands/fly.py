@@ -22,6 +22,8 @@ from css_common.mission import Mission
 from css_recording.errors import BagError
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import Run, estimator_runs
+from css_studies.spin_flight import read_spinning
+from css_studies.spin_summary import spin_lines, spin_object
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -62,6 +64,9 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
             # a recorder that died leaves such a recording, and why it died is the better news
             result.failure = result.failure or str(error)
     print_result(console, result, runs)
+    spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
+    for line in spin_lines(spinning) if spinning is not None else ():
+        console.print(line, soft_wrap=True)
     if result.failure:
         complain("the flight failed:", result.failure)
     flown = not (result.failure or result.interrupted)
@@ -69,7 +74,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     for line in missed:
         complain("criterion missed:", line)
     if as_json:
-        print_json(flight_object(result, runs))
+        print_json(flight_object(result, runs) | ({} if spinning is None else {"spin": spin_object(spinning)}))
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED

@@ -13,7 +13,8 @@ from css_common.run import node_main
 from css_common.schema import Values
 from css_common.vectors import multiply, vector_of
 from css_environment.albedo import albedo_output, new_workspace
-from css_environment.earth_light import albedo_sources, new_earth_view, new_light
+from css_environment.albedo_vector import MODELS, earth_light_sources
+from css_environment.earth_light import new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
 from css_msgs.msg import CssVoltages, SpacecraftState
@@ -59,12 +60,13 @@ class CssArray(Component):
         cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, self._cells)
         grid = earth_reflectivity.source(values, self.epoch_ns)
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
+        self._albedo_model = MODELS[values.albedo.model]
         self._view, self._light, self._work = new_earth_view(), new_light(), new_workspace()
         self._albedo = np.zeros(len(nominal))
         self._segment_s = -1.0
         self._to_dcm, self._turn = typed_call(mrp_to_dcm), typed_call(multiply)
         self._advance_earth = typed_call(advance_dcm_en)
-        self._sources, self._output = typed_call(albedo_sources), typed_call(albedo_output)
+        self._sources, self._output = typed_call(earth_light_sources), typed_call(albedo_output)
         self._sample = typed_call(sun_cells.sample)
         self._dcm_en = dcm_en_at(self.epoch_ns, 0.0)
 
@@ -79,7 +81,14 @@ class CssArray(Component):
         if self.values.albedo.enabled:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
             self._sources(
-                self._view, vector_of(truth.r_n), sun_n, truth.solar_flux, dcm_en, self._reflectivity, self._light
+                self._albedo_model,
+                self._view,
+                vector_of(truth.r_n),
+                sun_n,
+                truth.solar_flux,
+                dcm_en,
+                self._reflectivity,
+                self._light,
             )
             self._output(
                 self._light, self._cells, self._p.screen, self._p.cos_half_view, dcm_bn, self._work, self._albedo

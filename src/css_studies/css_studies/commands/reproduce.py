@@ -19,7 +19,7 @@ from css_studies.monte_carlo import StudyError
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.study import Progress
 from css_studies.reproduce.papers import Paper, ReproductionError, Request, find_paper, paper_names
-from css_studies.reproduce.rows import Row, number, printed, row_object
+from css_studies.reproduce.rows import Row, full_name, number, printed, row_object
 
 USAGE, INTERRUPTED = 2, 130
 CASES, QUICK_CASES = 1000, 40
@@ -89,14 +89,15 @@ def _print_table(paper: Paper, rows: Sequence[Row], console: Console) -> None:
     console.print(table)
     for row in rows:
         if not row.ok:
-            quantity = row_object(row)["quantity"]
-            console.print(f"misses: {quantity}, {number(row.here)} {row.unit}, must be {row.must}", soft_wrap=True)
+            console.print(
+                f"misses: {full_name(row)}, {number(row.here)} {row.unit}, must be {row.must}", soft_wrap=True
+            )
 
 
 def _result(row: Row | None) -> Text:
     if row is None:
         return Text("")
-    return Text(number(row.here), style="" if row.ok else "bold red")
+    return Text(number(row.here, row.digits), style="" if row.ok else "bold red")
 
 
 if __name__ == "__main__":

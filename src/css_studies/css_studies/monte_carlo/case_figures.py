@@ -43,6 +43,7 @@ TALLY = np.dtype(
             "run",  # sunlit and power positive steps in a row, until acquisition
             "headings",  # sunlit steps after acquisition with an estimate, and the sums over them
             "pointings",
+            "sunlit_headings",  # sunlit steps with an estimate, those before acquisition included
             "late",
             "reported",
             "final",
@@ -56,6 +57,8 @@ TALLY = np.dtype(
         for name in (
             "heading_sum",
             "pointing_sum",
+            "sunlit_heading_sum",
+            "sunlit_pointing_sum",
             "late_sum",
             "reported_sum",
             "reported_knowledge_sum",
@@ -183,11 +186,15 @@ def _tally_sunlit(tallies, c, step, marks, pointing, error) -> None:
             t.away_later += 1
     else:
         t.within += 1
+    t.sunlit_pointing_sum += pointing
     if math.isnan(error):
         t.without_estimate += 1
-    elif (marks & LATE) != 0:
-        t.late += 1
-        t.late_sum += error
+    else:
+        t.sunlit_headings += 1
+        t.sunlit_heading_sum += error
+        if (marks & LATE) != 0:
+            t.late += 1
+            t.late_sum += error
     if t.acquired_step >= 0:
         _count(tallies, c, pointing, error)
         return

@@ -11,16 +11,16 @@ import sys
 from numba.extending import overload
 
 
-def estimate(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted):
+def estimate(p, state, dt, voltages, aiding, eclipse_predicted):
     """One cycle of the estimator that owns the parameters `p`; arguments in `css_estimation.sun_heading`."""
-    return sys.modules[type(p).__module__].step(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted)
+    return sys.modules[type(p).__module__].step(p, state, dt, voltages, aiding, eclipse_predicted)
 
 
 @overload(estimate)
-def _estimate(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted):
+def _estimate(p, state, dt, voltages, aiding, eclipse_predicted):
     step = sys.modules[p.instance_class.__module__].step
 
-    def call(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted):
-        return step(p, state, dt, voltages, gyro_b, gyro_valid, eclipse_predicted)
+    def call(p, state, dt, voltages, aiding, eclipse_predicted):
+        return step(p, state, dt, voltages, aiding, eclipse_predicted)
 
     return call

@@ -14,8 +14,10 @@ from css_common.kernel import kernel, outer_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Mat3, Vec3, multiply, row
 from css_environment.albedo import albedo_output
+from css_environment.albedo_vector import PATCHES, point_source
 from css_environment.earth_light import gather_light
 from css_environment.ephemeris import EnvironmentState
+from css_estimation.sun_heading import Aiding
 from css_sim import gyro, magnetometer, sun_cells
 from css_sim.disturbances import Disturbances
 from css_sim.gyro import Gyro
@@ -37,11 +39,14 @@ class Vehicle(NamedTuple):
     cells: SunCells
     albedo: bool
     own_earth: bool  # each case has its own reflectivities
+    albedo_model: int  # of `albedo_vector`
     gyro: Gyro
     gyro_on: bool
     magnetometer: Magnetometer
     magnetometer_on: bool
-    field_divider: int  # steps from one measurement of the field to the next; 0: the control listens to none
+    field_divider: int  # steps from one measurement of the field to the next; 0: nobody listens
+    estimator_hears_field: bool
+    control_hears_field: bool
     estimator: Any
     control: ControlParameters
     disturbances: Disturbances
@@ -108,15 +113,11 @@ def _case_spacecraft(v: Vehicle, cases: Cases, c: int) -> Spacecraft:
 @kernel
 def _measured_field(
     v: Vehicle, bias_b: Vec3, key: RandomKey, step: int, dcm_bn: Mat3, environment: EnvironmentState, state: CaseState
-) -> tuple[Vec3, int, bool]:
-    """Last measurement, its step, and whether the next may still be on its way, as the control node has it."""
-    field_b, taken = state.field_b, state.field_step
-    if v.field_divider == 0:
-        return field_b, taken, False
-    if v.magnetometer_on and step % v.field_divider == 0:
-        field_b = magnetometer.measure(v.magnetometer, bias_b, key, step, multiply(dcm_bn, environment.field_n))
-        taken = step
-    return field_b, taken, taken >= 0 and step - taken < v.field_divider
+) -> tuple[Vec3, int]:
+    """Last measurement and its step; -1: none yet."""
+    if v.field_divider == 0 or not v.magnetometer_on or step % v.field_divider != 0:
+        return state.field_b, state.field_step
+    return magnetometer.measure(v.magnetometer, bias_b, key, step, multiply(dcm_bn, environment.field_n)), step
 
 
 @outer_kernel
@@ -157,7 +158,13 @@ def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
         if v.albedo:
             if v.own_earth:
                 light = cases.light[c]
-                gather_light(view_at(around.views, k), cases.reflectivity[c], light)
+                if v.albedo_model == PATCHES:
+                    gather_light(view_at(around.views, k), cases.reflectivity[c], light)
+                else:
+                    e = environment
+                    point_source(
+                        v.albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, cases.reflectivity[c], light
+                    )
             else:
                 light = around.light[k]
             albedo_output(light, cells, v.cells.screen, v.cells.cos_half_view, dcm_bn, work, albedo)
@@ -166,11 +173,12 @@ def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
         gyro_b = (0.0, 0.0, 0.0)
         if v.gyro_on:
             gyro_b = gyro.measure(v.gyro, gyro_errors, key, step, rotation.omega_bn_b)
-        estimator, heading = estimate(
-            v.estimator, state.estimator, since_s, voltages, gyro_b, v.gyro_on, around.predicted[k]
-        )
+        field_b, field_step = _measured_field(v, field_bias_b, key, step, dcm_bn, environment, state)
+        aiding = Aiding(gyro_b, v.gyro_on, field_b, v.estimator_hears_field and field_step == step)
+        estimator, heading = estimate(v.estimator, state.estimator, since_s, voltages, aiding, around.predicted[k])
         wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
-        field_b, field_step, field_valid = _measured_field(v, field_bias_b, key, step, dcm_bn, environment, state)
+        # as the control node has it: the last measurement, for as long as the next may be on its way
+        field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.field_divider
         control, _ = sun_pointing_control.step(
             v.control,
             state.control,

@@ -14,6 +14,7 @@ from css_common.mission import Event, Mission, MissionError, Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values, default_values, shaped_values
 from css_environment.albedo import new_workspace
+from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
 from css_estimation.sun_estimator import SunEstimator
 from css_sim import (
@@ -85,7 +86,12 @@ class MissionFlight:
         if self._grid is not None:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
         self.surroundings = SurroundingsTables(
-            self._plant.values, self._estimator.values, common, self._own_earth, self._feels_field()
+            self._plant.values,
+            self._estimator.values,
+            common,
+            self._own_earth,
+            self._feels_field(),
+            MODELS[array.albedo.model],
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
         self.marks = step_marks(illumination, mission.period_ns * 1e-9)
@@ -152,18 +158,23 @@ class MissionFlight:
         craft = spacecraft(plant, self._key(0), plant.substeps)
         gyro_values = values[self._gyro.name] if self._gyro else default_values(Gyro.table())
         field_values = values[self._magnetometer.name] if self._magnetometer else default_values(Magnetometer.table())
-        listens = plant.rods.fitted and self._magnetometer is not None
+        has_field = self._magnetometer is not None
+        control_hears = has_field and plant.rods.fitted
+        estimator_hears = has_field and values[self._estimator.name].rate.use_field
         x, y, z = (float(c) for c in plant.spacecraft.array_normal)
         return Vehicle(
             period_ns=self.mission.period_ns,
             cells=sun_cells.parameters(array),
             albedo=array.albedo.enabled,
             own_earth=self._own_earth,
+            albedo_model=MODELS[array.albedo.model],
             gyro=gyro.parameters(gyro_values),
             gyro_on=_is_on(self._gyro, done),
             magnetometer=magnetometer.parameters(field_values),
             magnetometer_on=_is_on(self._magnetometer, done),
-            field_divider=values[self._control.name].magnetometer.divider if listens else 0,
+            field_divider=field_values.magnetometer.divider if control_hears or estimator_hears else 0,
+            estimator_hears_field=estimator_hears,
+            control_hears_field=control_hears,
             estimator=self._algorithm.parameters(values[self._estimator.name]),
             control=sun_pointing_control.parameters(values[self._control.name]),
             disturbances=craft.disturbances,

@@ -14,7 +14,8 @@ from css_common.epochs import parse_utc
 from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
 from css_environment import ephemeris
-from css_environment.earth_light import EarthView, gather_light, look_at_earth, new_earth_view, new_light
+from css_environment.albedo_vector import PATCHES, earth_light_sources
+from css_environment.earth_light import EarthView, look_at_earth, new_earth_view, new_light
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.eclipse_prediction import EclipsePrediction
@@ -47,7 +48,7 @@ class Surroundings(NamedTuple):
     states: np.ndarray  # (K,) of STATE
     predicted: np.ndarray  # (K,) what the estimator's orbit model says about the shadow
     light: np.ndarray  # (K, 192) patches of light of the Earth; (0, 192) when each case has its own Earth, or none
-    views: EarthView  # (K, ...) the Earth seen from the orbit, for cases that have their own; else (0, ...)
+    views: EarthView  # (K, ...) the Earth seen from the orbit, for cases that sum patches of their own; else (0, ...)
 
 
 @kernel
@@ -85,11 +86,10 @@ def _tabulate_states(tables: Ephemeris, elapsed_s, states) -> None:
 
 
 @outer_kernel
-def _tabulate_light(states, view: EarthView, reflectivity, light) -> None:
+def _tabulate_light(model: int, states, view: EarthView, reflectivity, light) -> None:
     for k in range(states.shape[0]):
         e = state_at(states, k)
-        look_at_earth(view, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, reflectivity.shape[0], reflectivity.shape[1])
-        gather_light(view, reflectivity, light[k])
+        earth_light_sources(model, view, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, reflectivity, light[k])
 
 
 @outer_kernel
@@ -108,6 +108,7 @@ class SurroundingsTables:
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
+        albedo_model: `albedo_vector.PATCHES`, `VECTOR` or `NADIR`.
     """
 
     def __init__(
@@ -117,6 +118,7 @@ class SurroundingsTables:
         reflectivity: np.ndarray | None,
         own_earth: bool = False,
         field: bool = True,
+        albedo_model: int = PATCHES,
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field)
         self._prediction: EclipsePrediction | None = None
@@ -126,6 +128,7 @@ class SurroundingsTables:
         self._epoch_ns = parse_utc(plant.mission.epoch)
         self._reflectivity = reflectivity
         self._own_earth = own_earth
+        self._albedo_model = albedo_model
         self._blocks: OrderedDict[tuple[int, int], Surroundings] = OrderedDict()
         self._bytes = 0
         self._lock = threading.Lock()
@@ -164,11 +167,12 @@ class SurroundingsTables:
         grid = self._reflectivity
         has_light = grid is not None and not self._own_earth
         light = aligned_table(count if has_light else 0, len(new_light()))
-        views = _views(count if grid is not None and self._own_earth else 0)
-        if grid is not None and self._own_earth:
+        has_views = grid is not None and self._own_earth and self._albedo_model == PATCHES
+        views = _views(count if has_views else 0)
+        if grid is not None and has_views:
             _tabulate_views(states, views, *grid.shape)
-        elif grid is not None:
-            _tabulate_light(states, new_earth_view(), grid, light)
+        elif grid is not None and has_light:
+            _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
         return Surroundings(states, predicted, light, views)
 
 

@@ -41,20 +41,26 @@ class Row(NamedTuple):
     note: str = ""  # where we differ: how much of it is due to what
     relation: str = ""  # what the paper writes before its number, such as "<", or instead of one
     variant: str = ""  # of what flew; empty: as the paper has it
+    digits: int = 3  # significant ones of a number
 
 
 def row(
-    quantity: str, unit: str, paper: float | None, here: float | None, must: Must | None = None, **rest: str
+    quantity: str, unit: str, paper: float | None, here: float | None, must: Must | None = None, **rest: Any
 ) -> Row:
     """A row whose `ok` follows from `here` and `must`."""
     here = None if here is None or not math.isfinite(here) else float(here)
     return Row(quantity, unit, paper, here, must, (must or Must()).admits(here), **rest)
 
 
+def full_name(line: Row) -> str:
+    """The quantity with its variant behind it."""
+    return f"{line.quantity}, {line.variant}" if line.variant else line.quantity
+
+
 def row_object(line: Row) -> dict[str, Any]:
     """A row as plain data; the variant stands behind the quantity."""
     return {
-        "quantity": f"{line.quantity}, {line.variant}" if line.variant else line.quantity,
+        "quantity": full_name(line),
         "unit": line.unit,
         "paper": line.paper,
         "here": line.here,
@@ -63,11 +69,12 @@ def row_object(line: Row) -> dict[str, Any]:
     }
 
 
-def number(value: float | None) -> str:
-    """Three significant digits, or a dash for what is unknown."""
+def number(value: float | None, significant: int = 3) -> str:
+    """Some significant digits, or a dash for what is unknown."""
     if value is None:
         return "-"
-    digits = 2 if value == 0.0 else 2 - math.floor(math.log10(abs(value)) + 1e-12)
+    last = significant - 1
+    digits = last if value == 0.0 else last - math.floor(math.log10(abs(value)) + 1e-12)
     text = f"{value:.{max(digits, 0)}f}"
     return text.rstrip("0").rstrip(".") if "." in text else text
 
@@ -76,7 +83,7 @@ def printed(line: Row) -> str:
     """What the paper says of a quantity."""
     if line.paper is None:
         return line.relation or "-"
-    return f"{line.relation} {number(line.paper)}".strip()
+    return f"{line.relation} {number(line.paper, line.digits)}".strip()
 
 
 def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
@@ -99,7 +106,7 @@ def table_of(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
 def _result(line: Row | None) -> list[str]:
     if line is None:
         return ["", ""]
-    text = number(line.here)
+    text = number(line.here, line.digits)
     return [text if line.ok else f"{text} {MISSES}", "" if line.must is None else str(line.must)]
 
 
@@ -108,5 +115,5 @@ def notes_of(rows: Iterable[Row]) -> list[str]:
     by_note: dict[str, list[str]] = {}
     for line in rows:
         if line.note:
-            by_note.setdefault(line.note, []).append(line.quantity)
+            by_note.setdefault(line.note, []).append(full_name(line))
     return [f"{'; '.join(dict.fromkeys(quantities))}: {note}" for note, quantities in by_note.items()]

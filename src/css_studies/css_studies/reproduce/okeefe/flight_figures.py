@@ -42,6 +42,10 @@ class Shadow(NamedTuple):
     time_s: np.ndarray  # (T,) since the epoch
     dark: np.ndarray  # (T,) bool
 
+    def at(self, time_s: np.ndarray) -> np.ndarray:
+        """(K,) whether it is dark at times [s]."""
+        return self.dark[np.searchsorted(self.time_s, time_s).clip(max=len(self.dark) - 1)]
+
 
 class Quantity(NamedTuple):
     """A quantity against time."""

@@ -66,8 +66,8 @@ def flight_part(
     )
     rows = [
         *orbit_rows(mission.values.mission.duration, shadow),
-        *flight_rows(printed, notes),
-        *flight_rows(improved),
+        *flight_rows(printed, shadow, notes),
+        *flight_rows(improved, shadow),
         *attitude_rows(printed, shadow),
     ]
     return Part([Section("Flights", plots), Section("Converging", [converging_table(variants)])], rows)

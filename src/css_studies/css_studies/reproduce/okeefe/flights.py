@@ -29,6 +29,7 @@ class Merit(NamedTuple):
     heading_error_deg: float | None  # mean over the cases, after acquisition
     pointing_error_deg: float | None  # likewise, of array normal to true Sun
     rate_50min_deg_s: float | None
+    rate_knowledge_50min_deg_s: float | None
     converging_mean_min: float | None
     converging_max_min: float | None  # None also when a case never converged
     converging_first_max_min: float | None  # first pass through sunlight
@@ -51,20 +52,6 @@ def curve(percentiles: pa.Table, configuration: Configuration, quantity: str) ->
     return Curve(*(np.asarray(table.column(name).to_numpy(), dtype=np.float64) for name in ("time_s", "mean", "p95")))
 
 
-def rate_error_before(percentiles: pa.Table, configuration: Configuration, time_s: float) -> tuple[float, float] | None:
-    """Mean error of the estimated rate [deg/s] in the last minute up to a time in which there is one, and its end [s].
-
-    Without gyro and light no rate is measured.
-    """
-    line = curve(percentiles, configuration, "rate_knowledge_deg_s")
-    known = np.flatnonzero(np.isfinite(line.mean) & (line.time_s <= time_s))
-    if not len(known):
-        return None
-    end_s = float(line.time_s[known[-1]])
-    last = known[line.time_s[known] > end_s - _MINUTE]
-    return float(line.mean[last].mean()), end_s
-
-
 def merit(cases: pa.Table, configuration: Configuration) -> Merit:
     """Figures of merit of one configuration."""
 
@@ -79,6 +66,7 @@ def merit(cases: pa.Table, configuration: Configuration) -> Merit:
         heading_error_deg=_mean(of("heading_error_mean_deg")),
         pointing_error_deg=_mean(of("pointing_error_mean_deg")),
         rate_50min_deg_s=_mean(of("rate_50min_deg_s")),
+        rate_knowledge_50min_deg_s=_mean(of("rate_knowledge_50min_deg_s")),
         converging_mean_min=_mean(converging),
         converging_max_min=_longest(converging),
         converging_first_max_min=_longest(of("converging_first_s") / _MINUTE),

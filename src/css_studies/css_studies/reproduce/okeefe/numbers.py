@@ -13,8 +13,8 @@ import numpy as np
 
 from css_studies.monte_carlo import Configuration
 from css_studies.reproduce.okeefe.cells import OrbitOutputs
-from css_studies.reproduce.okeefe.flight_figures import POINTING_ERROR, Shadow, Variant
-from css_studies.reproduce.okeefe.flights import column, curve, merit, rate_error_before
+from css_studies.reproduce.okeefe.flight_figures import POINTING_ERROR, RATE_KNOWLEDGE, Shadow, Variant
+from css_studies.reproduce.okeefe.flights import column, curve, merit
 from css_studies.reproduce.rows import Must, Row, number, row
 
 _LATE_S = 300.0  # sunlit time at the end of a flight over which errors are averaged, as in a study's cases
@@ -23,6 +23,7 @@ _LATE_S = 300.0  # sunlit time at the end of a flight over which errors are aver
 _NOISE_DEG_S = 0.01 * math.sqrt(8.0 / math.pi)
 _DEADBAND_DEG = 15.0
 _REPORT_TIME_S = 3000.0
+_DUSK_S = 30.0
 
 HEADING, RATE, KNOWLEDGE, CONVERGING, CONVERGED = "heading", "rate", "knowledge", "converging", "converged"
 """Kinds of quantities of a flight."""
@@ -110,17 +111,17 @@ def albedo_rows(low: Peaks, polar: Peaks) -> list[Row]:
     return [line("45", 25.0, low, Must(20.0, 30.0)), line("90", 50.0, polar, Must(35.0, 60.0))]
 
 
-def flight_rows(variant: Variant, notes: Mapping[tuple[str, str], str] | None = None) -> list[Row]:
+def flight_rows(variant: Variant, shadow: Shadow, notes: Mapping[tuple[str, str], str] | None = None) -> list[Row]:
     """The flights of a variant, which keeps to the paper's bounds as printed, and else must be better than the paper.
 
     Args:
+        shadow: where the orbit of the flights is dark.
         notes: label of a configuration and kind of quantity to why it differs from the paper.
     """
     rows = []
     for label, _, configuration in variant.entries:
         paper, here = _PAPER[label], merit(variant.cases, configuration)
         error_must = _ERROR_MUST[label.split(",")[0]] if variant.is_printed else Must(None, paper.error_deg)
-        rate_error, rate_note = _rate_error(variant, configuration)
 
         def line(
             kind: str,
@@ -143,9 +144,10 @@ def flight_rows(variant: Variant, notes: Mapping[tuple[str, str], str] | None = 
             line(HEADING, "heading error at the end", "deg", paper.error_deg, here.heading_error_late_deg, error_must),
             line(RATE, "rate at 50 min", "deg/s", paper.rate_deg_s, here.rate_50min_deg_s,
                  Must(None, paper.rate_deg_s or _NOISE_DEG_S), "" if paper.rate_deg_s else "noise"),
-            line(KNOWLEDGE, "rate error at 50 min", "deg/s", paper.knowledge_deg_s, rate_error,
+            line(KNOWLEDGE, "rate error at 50 min", "deg/s", paper.knowledge_deg_s,
+                 here.rate_knowledge_50min_deg_s,
                  Must(None, paper.knowledge_deg_s or _NOISE_DEG_S), "" if paper.knowledge_deg_s else "noise",
-                 rate_note),
+                 _before_the_dark(variant, configuration, shadow)),
             line(CONVERGING, "longest converging", "min", paper.converging_min, here.converging_max_min,
                  Must(None, paper.converging_min), paper.relation, _slow_cases(variant, configuration, paper)),
             line(CONVERGED, "cases converged", "%", 100.0, here.converged_percent, Must(100.0)),
@@ -159,16 +161,20 @@ def _slow_cases(variant: Variant, configuration: Configuration, paper: _Printed)
     return f"{slow} of {len(minutes)} cases take longer than the paper's longest" if slow else ""
 
 
-def _rate_error(variant: Variant, configuration: Configuration) -> tuple[float | None, str]:
-    found = rate_error_before(variant.percentiles, configuration, _REPORT_TIME_S)
-    if found is None:
-        return None, ""
-    value, end_s = found
-    if end_s > _REPORT_TIME_S - 60.0:
-        return value, ""
+def _before_the_dark(variant: Variant, configuration: Configuration, shadow: Shadow) -> str:
+    """What the rate error was in the last sunlit minute before 50 min, if it is dark then and no gyro measures."""
+    if configuration.gyro or not shadow.at(np.array([_REPORT_TIME_S]))[0]:
+        return ""
+    line = curve(variant.percentiles, configuration, RATE_KNOWLEDGE.name)
+    lit = np.flatnonzero((line.time_s <= _REPORT_TIME_S) & ~shadow.at(line.time_s))
+    if not len(lit):
+        return ""
+    # the last seconds of sunlight are dim, and no time to read a rate from
+    end_s = line.time_s[lit[-1]] - _DUSK_S
+    minute = (line.time_s > end_s - 60.0) & (line.time_s <= end_s)
     return (
-        value,
-        f"at 50 min it is dark here and nothing measures a rate: the last minute before, at {end_s / 60:.1f} min",
+        f"at 50 min it is dark here and nothing measures a rate, the estimator holds or forgets its last one; in a "
+        f"minute of sunlight before, at {end_s / 60.0:.0f} min, it errs by {number(float(line.mean[minute].mean()))}"
     )
 
 
@@ -176,8 +182,7 @@ def attitude_rows(variant: Variant, shadow: Shadow) -> list[Row]:
     """Attitude errors that the text reads from Fig. 2: the average settles where its own error meets the deadband."""
     entry = next(entry for entry in variant.entries if entry.label == "average, gyro")
     line = curve(variant.percentiles, entry.configuration, POINTING_ERROR.name)
-    sunlit = ~shadow.dark[np.searchsorted(shadow.time_s, line.time_s).clip(max=len(shadow.dark) - 1)]
-    late = np.flatnonzero(sunlit & np.isfinite(line.mean))
+    late = np.flatnonzero(~shadow.at(line.time_s) & np.isfinite(line.mean))
     late = late[line.time_s[late] > line.time_s[late[-1]] - _LATE_S] if len(late) else late
     mean, p95 = (float(values[late].mean()) if len(late) else None for values in (line.mean, line.p95))
     return [

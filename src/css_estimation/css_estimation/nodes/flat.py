@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Safe-hold Sun heading from flat cells."""
+
+from collections.abc import Iterable
+from types import ModuleType
+from typing import ClassVar
+
+from css_common.run import node_main
+from css_common.schema import Values
+from css_estimation import flat_cells
+from css_estimation.safe_hold import MODE_NAMES
+from css_estimation.sun_estimator import SunEstimator
+
+
+class Flat(SunEstimator):
+    """Sun heading from the brighter of each pair of opposite faces (Benton)."""
+
+    algorithm: ClassVar[ModuleType] = flat_cells
+    parameters = flat_cells.PARAMETERS
+    mode_names = MODE_NAMES
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        return flat_cells.conflicts(values)
+
+
+main = node_main(Flat)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Safe-hold Sun heading from a collared pyramid of cells, or flat ones where it does not see the Sun."""
+
+from collections.abc import Iterable
+from types import ModuleType
+from typing import ClassVar
+
+from css_common.run import node_main
+from css_common.schema import Values
+from css_estimation import pyramid_switch
+from css_estimation.safe_hold import MODE_NAMES
+from css_estimation.sun_estimator import SunEstimator
+
+
+class PyramidSwitch(SunEstimator):
+    """Sun heading from a collared pyramid once flat cells have found the Sun (Benton)."""
+
+    shared = (*SunEstimator.shared, "spacecraft")
+    algorithm: ClassVar[ModuleType] = pyramid_switch
+    parameters = pyramid_switch.PARAMETERS
+    mode_names = MODE_NAMES
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        return pyramid_switch.conflicts(values)
+
+
+main = node_main(PyramidSwitch)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

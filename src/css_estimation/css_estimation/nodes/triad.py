@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude of a spinning body from slits and magnetometer."""
+
+from collections import deque
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from sensor_msgs.msg import MagneticField
+
+from css_common.attitude import dcm_to_quaternion
+from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
+from css_common.run import node_main
+from css_common.schema import Values, choice
+from css_common.vectors import Vec3, norm, vector_of
+from css_environment.mission_environment import MissionEnvironment
+from css_estimation import flight_references, sun_field_attitude
+from css_estimation.messages import field_reading
+from css_estimation.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN
+from css_estimation.symmetric import Symmetric, isotropic
+from css_msgs.msg import AttitudeEstimate, SlitSunAngle
+
+_ORDERS = {"best": ORDER_BEST, "sun": ORDER_SUN, "field": ORDER_FIELD}
+
+
+class _Sighting(NamedTuple):
+    instant_ns: int
+    sun_b: Vec3
+    covariance: Symmetric
+    rate: float  # [rad/s]
+
+
+class _FieldSample(NamedTuple):
+    stamp_ns: int
+    field_b: Vec3
+    variance: float  # [T^2]
+
+
+class Triad(Component):
+    """Attitude at each passage of the Sun, from its direction and the field at the same instant (TRIAD).
+
+    The field is interpolated between samples, so an attitude goes out two samples after its instant: it is that of
+    `age` before the stamp. References are the Sun's ephemeris and IGRF at the flight's position.
+    """
+
+    shared = ("orbit", "magnetometer")
+    parameters = (
+        *(p for p in flight_references.PARAMETERS if p.name == "reference.field_degree"),
+        choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; best: that with the smaller covariance"),
+    )
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        return (
+            Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle),
+            Input("field", "mag/field", MagneticField, divider=values.magnetometer.divider, used=("magnetic_field",)),
+        )
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        sampling = values.mission.period * values.magnetometer.divider
+        if sampling > 0.05:
+            yield (
+                f"magnetometer.divider: a sample every {sampling:g} s given, expected at most 0.05 s: the field of a "
+                "spinning body is interpolated"
+            )
+
+    def configure(self) -> None:
+        self._environment = MissionEnvironment(self.values, field=True, field_degree=self.values.reference.field_degree)
+        self._spacing_ns = self.period_ns * self.values.magnetometer.divider
+        self._order = _ORDERS[self.values.primary]
+        self._samples: deque[_FieldSample] = deque(maxlen=64)
+        self._sightings: deque[_Sighting] = deque(maxlen=64)
+        self._newest: dict[str, Any] | None = None
+        self._instant_ns = 0
+        self._attitude = typed_call(sun_field_attitude.sun_field_attitude)
+        self._interpolated = typed_call(sun_field_attitude.interpolated_field)
+        self._variance = typed_call(sun_field_attitude.interpolated_variance)
+        self._quaternion = typed_call(dcm_to_quaternion)
+        # compiled here, not at the first passage: the loop would wait
+        field_b = (0.0, 1e-5, 0.0)
+        self._interpolated(field_b, field_b, field_b, field_b, 0.5)
+        self._variance(0.0, 1e-5, 0.1, 0.5)
+        x = (1.0, 0.0, 0.0)
+        attitude = self._attitude(x, isotropic(0.0), field_b, 1e-14, x, field_b, self._order)
+        self._quaternion(attitude.dcm_bn)
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        angle = received["angle"]
+        assert angle is not None  # a required input
+        if received["field"] is not None:
+            field_b, valid = field_reading(received["field"])
+            if valid:
+                variance = max(float(received["field"].magnetic_field_covariance[0]), 0.0)
+                self._samples.append(_FieldSample(stamp_ns, field_b, variance))
+        if angle.validity == SlitSunAngle.VALIDITY_VALID:
+            c = angle.covariance.tolist()
+            covariance = (c[0], c[1], c[2], c[4], c[5], c[8])
+            instant_ns = stamp_ns - round(angle.age * 1e9)
+            self._sightings.append(_Sighting(instant_ns, vector_of(angle.sun_b), covariance, angle.rate))
+        fresh = self._settle(stamp_ns)
+        return {"attitude": self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))}
+
+    def _settle(self, stamp_ns: int) -> bool:
+        """The attitude of the oldest sighting whose field is known by now; True when there is a new one."""
+        while self._sightings and stamp_ns >= self._sightings[0].instant_ns + 2 * self._spacing_ns:
+            sighting = self._sightings.popleft()
+            around = self._around(sighting.instant_ns)
+            if around is not None and self._solve(sighting, around):
+                return True
+        return False
+
+    def _around(self, instant_ns: int) -> list[_FieldSample] | None:
+        """Two samples before an instant and two after it; None when one of them was not measured."""
+        first = -(-(instant_ns - self.epoch_ns) // self._spacing_ns) - 2
+        stamps = [self.epoch_ns + (first + i) * self._spacing_ns for i in range(4)]
+        by_stamp = {sample.stamp_ns: sample for sample in self._samples}
+        return [by_stamp[stamp] for stamp in stamps] if all(stamp in by_stamp for stamp in stamps) else None
+
+    def _solve(self, sighting: _Sighting, around: list[_FieldSample]) -> bool:
+        u = (sighting.instant_ns - around[1].stamp_ns) / self._spacing_ns
+        field_b = self._interpolated(*(sample.field_b for sample in around), u)
+        turn = sighting.rate * self._spacing_ns * 1e-9
+        variance = self._variance(max(sample.variance for sample in around), norm(field_b), turn, u)
+        at = self._environment.at((sighting.instant_ns - self.epoch_ns) * 1e-9)
+        attitude = self._attitude(
+            sighting.sun_b, sighting.covariance, field_b, variance, at.sun_n, at.field_n, self._order
+        )
+        if attitude.mode == MODE_NONE:
+            return False
+        xx, xy, xz, yy, yz, zz = attitude.covariance
+        covariance = np.zeros((6, 6))
+        covariance[:3, :3] = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
+        self._instant_ns = sighting.instant_ns
+        self._newest = {
+            "q_bn": np.array(self._quaternion(attitude.dcm_bn)),
+            "omega_bn_b": np.array((0.0, 0.0, sighting.rate)),
+            "gyro_bias_b": np.zeros(3),
+            "covariance": covariance.ravel(),
+            "nis": attitude.nis,
+            "lit_mask": 0,
+            "nis_dof": 1,
+            "used": AttitudeEstimate.USED_FIELD | AttitudeEstimate.USED_SUN,
+            "mode": attitude.mode,
+        }
+        return True
+
+    def _fields(self, stamp_ns: int, fresh: bool) -> dict[str, Any]:
+        if self._newest is None:
+            no_covariance = np.zeros(36)
+            no_covariance[0] = -1.0
+            vectors = {"q_bn": np.zeros(4), "omega_bn_b": np.zeros(3), "gyro_bias_b": np.zeros(3)}
+            numbers = dict.fromkeys(("lit_mask", "nis_dof", "used", "mode"), 0)
+            validity = AttitudeEstimate.VALIDITY_NONE
+            return {**vectors, **numbers, "covariance": no_covariance, "age": 0.0, "nis": 0.0, "validity": validity}
+        return {
+            **self._newest,
+            "age": (stamp_ns - self._instant_ns) * 1e-9,
+            "validity": AttitudeEstimate.VALIDITY_VALID if fresh else AttitudeEstimate.VALIDITY_HELD,
+        }
+
+
+main = node_main(Triad)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

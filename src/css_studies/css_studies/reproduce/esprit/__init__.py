@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Figures and numbers of Reichard et al., the Sun sensor of the ESPRIT rocket."""
