@@ -250,5 +250,6 @@ def test_default_spacecraft_is_that_of_the_paper():
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-15)
     np.testing.assert_allclose(np.abs(normals[:, 2]), math.sqrt(0.5))
     assert sorted(np.sign(normals[:, 2])) == [-1.0] * 4 + [1.0] * 4
-    axes = sections.WHEELS[0].shaped(sections.WHEELS[0].default)
+    specification = next(p for p in sections.WHEELS if p.name == "wheels.axes")
+    axes = specification.shaped(specification.default)
     np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-15)

@@ -245,3 +245,9 @@ def test_inertia_of_a_flat_plate_passes():
 def test_specifications_cannot_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
         GAIN.low = -1.0
+
+
+def test_a_spacecraft_without_wheels_has_no_axes():
+    fitted, bare = (default_values(sections.WHEELS, wheels__fitted=word) for word in (True, False))
+    assert sections.wheel_axes(fitted).shape == (4, 3)
+    assert sections.wheel_axes(bare).shape == (0, 3)

@@ -106,6 +106,35 @@ def test_four_diodes_in_a_plane_want_voltages(totals):
     assert mean(t, "error_sum", VOLTAGE) < 1.2 * mean(totals["six"], "error_sum", VOLTAGE)
 
 
+def under_albedo(*overrides):
+    """Totals where the Earth lights cells that do not read below zero."""
+    return AttitudeFlight(
+        mission("css_array.albedo.enabled=true", "css_array.output_low=0", *overrides)
+    ).fly(CASES).tallies.totals  # fmt: skip
+
+
+def test_a_predicted_albedo_costs_nothing(totals):
+    t = under_albedo("attitude_voltage.albedo.compensate=true")
+    assert mean(t, "error_sum", VOLTAGE) < 1.1 * mean(totals["six"], "error_sum", VOLTAGE)
+    assert mean(t, "nees3_sum", VOLTAGE) == pytest.approx(3.0, rel=0.15)
+
+
+def test_a_prediction_a_fifth_too_dark_is_far_better_than_none():
+    brighter = "css_array.albedo.factor=1.25"
+    predicted = under_albedo(brighter, "attitude_voltage.albedo.compensate=true")
+    ignored = under_albedo(brighter)
+    assert mean(predicted, "error_sum", VOLTAGE) < 0.4 * mean(ignored, "error_sum", VOLTAGE)
+
+
+def test_a_coarser_field_model_than_the_truths(totals):
+    """Harmonics up to degree 8 of 13 leave out some 20 nT, a tenth of the magnetometer's noise."""
+    coarse = [f"{name}.reference.field_degree=8" for name in ("attitude_vector", "attitude_voltage")]
+    t = AttitudeFlight(mission(*coarse)).fly(CASES).tallies.totals
+    for f in (VECTOR, VOLTAGE):
+        assert mean(t, "error_sum", f) != mean(totals["six"], "error_sum", f)
+        assert mean(t, "error_sum", f) < 1.1 * mean(totals["six"], "error_sum", f)
+
+
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [

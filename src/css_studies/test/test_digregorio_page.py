@@ -12,6 +12,6 @@ def test_the_page_has_its_numbers_and_figures(tmp_path):
         assert by_name[f"{diodes}: cases that diverge"].ok
         assert by_name[f"{diodes}: voltage over vector"].ok
         assert 0.1 < by_name[f"{diodes}: mean error, voltage"].here < 0.5
-    text = (tmp_path / "index.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
     for picture in ("case_0_six.png", "case_0_four.png", "error_over_cases.png"):
         assert picture in text and (tmp_path / picture).stat().st_size > 10_000
