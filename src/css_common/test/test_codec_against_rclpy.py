@@ -41,6 +41,7 @@ frames = st.one_of(
 )
 doubles = st.floats(allow_nan=False)
 integers = {
+    "int32": st.integers(-(2**31), 2**31 - 1),
     "uint8": st.integers(0, 2**8 - 1),
     "uint32": st.integers(0, 2**32 - 1),
 }
