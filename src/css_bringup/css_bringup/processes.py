@@ -24,6 +24,7 @@ from css_common.mission_file import MissionError
 
 RECORDER = "recorder"
 _POLL = 0.02
+_END_LIMIT = 30.0  # wall time [s] allowed to a process that was asked to end; a loaded machine needs seconds
 _RESTART_LIMIT = 60.0  # wall time [s] within which a second death of a node ends the run
 
 
@@ -178,13 +179,13 @@ class Supervisor:
 
     def stop(self) -> None:
         """Ends all processes: the plant first, whose last stamp the others answer, and the recorder last."""
-        self.plant.stop(5.0)
+        self.plant.stop(_END_LIMIT)
         for child in self.children.values():
             child.interrupt()
         for child in self.children.values():
-            child.stop(5.0)
+            child.stop(_END_LIMIT)
         if self.recorder is not None:
-            self.recorder.stop(30.0)
+            self.recorder.stop(_END_LIMIT)
 
     def summary(self, name: str) -> dict[str, Any]:
         """Figures that a process left at its end; empty when it was killed."""

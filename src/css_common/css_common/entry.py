@@ -21,12 +21,18 @@ def main() -> int:
     if interrupt is signal.default_int_handler:
         # Libraries take an exception in the middle of their import badly: until they are there Ctrl-C just ends.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
-    run = _module(Path(sys.argv[0])).main
+    module = _module(Path(sys.argv[0]))
     signal.signal(signal.SIGINT, interrupt)
     try:
-        return _with_pipe(run)
+        code = _with_pipe(module.main)
     except KeyboardInterrupt:
-        return _INTERRUPTED
+        code = _INTERRUPTED
+    if ".nodes." in module.__name__:
+        # A node has given up what it held. Taking the interpreter apart would cost seconds on a loaded machine, with
+        # threads of the middleware still running in it, which may crash it.
+        sys.stderr.flush()
+        os._exit(code)
+    return code
 
 
 def _module(executable: Path):

@@ -246,12 +246,15 @@ class ComponentNode(LifecycleNode):
         super().destroy_node()
         self._state_machine.destroy_when_not_in_use()
 
-    def finish(self, seconds: float = 2.0) -> None:
-        """Waits until listeners have what was published, so that a message is not lost with its sender."""
-        timeout = Duration(seconds=seconds)
+    def finish(self, seconds: float = 4.0) -> None:
+        """Waits until listeners have what was published, so that a message is not lost with its sender.
+
+        The middleware asks a listener that is behind again after 3 s.
+        """
+        limit = time.monotonic() + seconds
         try:
             for publisher, *_ in self._output_ports.values():
-                publisher.wait_for_all_acked(timeout)
+                publisher.wait_for_all_acked(Duration(seconds=max(0.0, limit - time.monotonic())))
         except RCLError:
             if self.context.ok():  # else a signal has ended all traffic already
                 raise
