@@ -99,7 +99,7 @@ def to_rosbags(message: Any) -> Any:
         if "/" in field_type:
             value = to_rosbags(value)
         elif not isinstance(value, (int, float, str)):
-            value = np.array(value, dtype=np.float64)
+            value = np.array(value, dtype=np.uint32 if "uint32" in field_type else np.float64)
         fields[name] = value
     return ROSBAGS.types[type_name](**fields)
 
