@@ -16,6 +16,7 @@ from css_common.mission import Mission, MissionError, Node
 from css_common.random_streams import RandomKey, Stream, normal4, random_key
 from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
+from css_environment.albedo_vector import MODELS
 from css_estimation import attitude_options, attitude_solution
 from css_estimation.attitude_options import AttitudeParameters, GivenStart
 from css_estimation.flight_references import FlightReferences
@@ -99,7 +100,7 @@ class AttitudeFlight:
             key = random_key(mission.values.mission.seed, mission.values.mission.case)
             grid = earth_reflectivity.source(array, mission.epoch_ns)
             earth = earth_reflectivity.case_reflectivity(array, grid, key)
-        self._surroundings = SurroundingsTables(plant, None, earth)
+        self._surroundings = SurroundingsTables(plant, None, earth, albedo_model=MODELS[array.albedo.model])
         self._sensors = self._common_sensors()
         self._models = [self._model(node) for node in nodes]
 
