@@ -52,7 +52,7 @@ WRONG = {
     "key": (["--set", "ekf.gat=1"], "override ekf.gat: unknown; did you mean ekf.gate?"),
     "swept key": (["--sweep", "css_array.nois=1,2"], "override css_array.nois: unknown; did you mean css_array.noise?"),
     "sweep without values": (["--sweep", "css_array.noise"], "--sweep css_array.noise: expected KEY=V1,V2,..."),
-    "swept value": (["--sweep", "css_array.noise=1,x"], "override: css_array.noise: 'x' given, expected a number"),
+    "swept value": (["--sweep", "css_array.noise=1,x"], "override css_array.noise: 'x' given, expected a number"),
     "estimator": (["--estimators", "kalman"], "css_estimation/kalman"),
     "cases": (["--cases", "0"], "--cases: 0 given, expected at least 1"),
     "first case": (["--first-case", "-1"], "--first-case: -1 given, expected at least 0"),
