@@ -39,9 +39,7 @@ def fly_cases_of(
     folder = request.folder / "studies" / f"{name}_{ESTIMATORS[mission]}_{cases}"
     progress = None if request.progress is None else request.progress(f"{name}, {ESTIMATORS[mission]}")
     configurations = list(dict.fromkeys(configuration(mission, change) for change in changes))
-    return run_study(
-        load_mission(mission, list(base)), configurations, cases, folder, sample_s=10.0, progress=progress
-    )
+    return run_study(load_mission(mission, list(base)), configurations, cases, folder, sample_s=10.0, progress=progress)
 
 
 def averages(cases: pa.Table, flown: Configuration) -> Averages:

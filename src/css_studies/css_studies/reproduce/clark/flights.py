@@ -62,9 +62,7 @@ def flight_of(log: FlightLog) -> Flight:
     error[unknown | ~log.sunlit] = np.nan
     on_pyramid[steps] = estimates.mode[rows] == MODE_PYRAMID
     passes = [(stretch.start_s, stretch.end_s) for stretch in sunlit_passes(log)]
-    return Flight(
-        log.time(truth), log.sunlit, np.degrees(log.pointing_error), sensed, error, on_pyramid, passes
-    )
+    return Flight(log.time(truth), log.sunlit, np.degrees(log.pointing_error), sensed, error, on_pyramid, passes)
 
 
 def _mission(log: FlightLog) -> Mission:
