@@ -108,5 +108,5 @@ def flat_note(controls: Controls) -> str:
 def _flat_at(controls: Controls, pyramid_deg: float) -> float:
     """Angle of the flat cells for gains with which the pyramid has a given one, between those that flew."""
     names = [AS_FLOWN, *(_gain_name(*gains) for gains in GAINS)]
-    known = sorted((controls.pyramid[name].panel, controls.flat[name].panel) for name in names)
-    return float(np.interp(pyramid_deg, *zip(*known, strict=True)))
+    known = np.array(sorted((controls.pyramid[name].panel, controls.flat[name].panel) for name in names))
+    return float(np.interp(pyramid_deg, known[:, 0], known[:, 1]))

@@ -117,8 +117,8 @@ def _campaign_part(campaign: Campaign, folder: Path) -> Part:
     heading = ["date", "error, flat [deg]", "panel, flat (worst) [deg]", "error, pyramid [deg]",
                "panel, pyramid (worst) [deg]", "pyramid over flat"]  # fmt: skip
     text = (
-        f"{campaign.cases} cases of each point, both ways to sense on the same draws: any attitude, rates up to 2 deg/s "
-        "about each axis, the node moved with the mean Sun. Means over the cases."
+        f"{campaign.cases} cases of each point, both ways to sense on the same draws: any attitude, rates up to 2 "
+        "deg/s about each axis, the node moved with the mean Sun. Means over the cases."
     )
     spread = write_campaign(campaign, folder / "campaign.png")
     seasons = write_profiles({day(date): found for date, found in profiles.items()}, folder / "seasons.png")
@@ -130,8 +130,8 @@ def _campaign_part(campaign: Campaign, folder: Path) -> Part:
         Section(
             "Seasons",
             [
-                "Clark flies into the light over the summer's ice: early in the pass in June, late in December, at both "
-                "ends at the equinoxes.",
+                "Clark flies into the light over the summer's ice: early in the pass in June, late in December, at "
+                "both ends at the equinoxes.",
                 Picture(seasons.name, "Error of the flat cells over a pass, nominal albedo, smoothed over 4 min."),
             ],
         ),
