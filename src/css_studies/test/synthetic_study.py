@@ -20,6 +20,8 @@ CASE_QUANTITIES = (
     "wheel_momentum_final",
     "nees_mean",
     "nis_mean",
+    "pointing_error_sunlit_deg",
+    "heading_error_sunlit_deg",
 )
 QUANTITIES = ("heading_error_deg", "pointing_error_deg", "rate_deg_s", "rate_knowledge_deg_s")
 
