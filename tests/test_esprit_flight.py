@@ -11,6 +11,8 @@ from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_msgs.msg import AttitudeEstimate, SlitPulse, SlitPulses, SlitSunAngle
 from css_studies.direct_flight import fly_and_keep
+from css_studies.estimate_errors import attitude_errors
+from css_studies.flight_log import read_flight
 from css_studies.spin_flight import read_spinning
 from css_studies.spin_summary import spin_lines, spin_object
 
@@ -90,6 +92,15 @@ def test_a_recording_tells_spin_and_coning(flown):
     assert told["legs"][0]["spin_hz"] == pytest.approx(6.0, rel=0.005)
     assert told["attitudes"] == len(flight.attitudes) > 30
     assert len(spin_lines(flight)) == 2
+
+
+def test_attitudes_of_a_recording_are_measured_at_their_own_instants(flown):
+    """At 6 Hz an attitude compared with the truth of its stamp would be off by a turn of up to 180 deg."""
+    _, bag, _ = flown
+    _, errors, nees = attitude_errors(read_flight(bag), "triad")
+    assert len(errors) > 700
+    assert np.degrees(errors.max()) < 2.0
+    assert np.mean(nees) < 4.0
 
 
 def test_sensors_alone_are_awaited_by_their_marker(tmp_path):

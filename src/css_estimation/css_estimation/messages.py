@@ -65,6 +65,7 @@ def attitude_estimate_fields(solution: AttitudeSolution, covariance: np.ndarray)
         "gyro_bias_b": np.array(solution.bias_b),
         "covariance": reported,
         "age": solution.age,
+        "delay": 0.0,
         "nis": solution.nis,
         "lit_mask": solution.lit_mask,
         "nis_dof": solution.nis_dof,

@@ -58,8 +58,8 @@ def test_it_finds_the_attitude_and_its_message_fits_the_type(model, references):
     codec = codec_of(AttitudeEstimate)
     for estimate in run(AttitudeFilter("left", values_of(sun_model=model)), references):
         data = codec.encode(estimate)
-        # no padding inside: 16 bytes of header, 48 doubles, 8 bytes
-        assert len(data) == 4 + 16 + 48 * 8 + 8
+        # no padding inside: 16 bytes of header, 49 doubles, 8 bytes
+        assert len(data) == 4 + 16 + 49 * 8 + 8
         again = codec.decode(data)
         for entry in codec.fields:
             np.testing.assert_array_equal(getattr(again, entry.name), getattr(estimate, entry.name))

@@ -3,7 +3,14 @@
 
 import numpy as np
 
-from css_common.attitude import mrp_angle, mrp_subtract, mrp_to_rotation_vector, quaternion_to_mrp
+from css_common.attitude import (
+    mrp_add,
+    mrp_angle,
+    mrp_subtract,
+    mrp_to_rotation_vector,
+    quaternion_to_mrp,
+    rotation_vector_to_mrp,
+)
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, axes_across, dot, multiply, row, subtract
 from css_estimation.error_covariance import attitude_block
@@ -79,8 +86,35 @@ def attitude_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray, 
     rows, steps = estimated_rows(log, name)
     errors, nees = np.empty(len(rows)), np.empty(len(rows))
     covariance = attitudes.covariance[rows].reshape(-1, 6, 6)
-    _attitude_errors_of_rows(attitudes.q_bn[rows], covariance, log.having("truth").sigma_bn[steps], errors, nees)
+    true = _true_attitudes(log, steps, attitudes.delay[rows])
+    _attitude_errors_of_rows(attitudes.q_bn[rows], covariance, true, errors, nees)
     return steps, errors, nees
+
+
+def _true_attitudes(log: FlightLog, steps: np.ndarray, delay: np.ndarray) -> np.ndarray:
+    """(K, 3) sigma_bn so long (K,) [s] before steps (K,) of the truth: the next step's, turned back by its rate."""
+    truth = log.having("truth")
+    if not np.any(delay > 0.0):
+        return truth.sigma_bn[steps]
+    time = log.time(truth)
+    instant = time[steps] - delay
+    # a nanosecond of slack: an instant that is a step's is that step's
+    after = np.clip(np.searchsorted(time, instant - 1e-9), 0, len(time) - 1)
+    back = (time[after] - instant)[:, None]
+    # the rate in the middle of the way
+    before = np.maximum(after - 1, 0)
+    share = 0.5 * back / max(log.period, 1e-9)
+    rate = (1.0 - share) * truth.omega_bn_b[after] + share * truth.omega_bn_b[before]
+    attitudes = np.empty((len(steps), 3))
+    _turned(truth.sigma_bn[after], -back * rate, attitudes)
+    return attitudes
+
+
+@kernel
+def _turned(sigma_bn, angles_b, sigma_out) -> None:
+    for i in range(sigma_out.shape[0]):
+        s = mrp_add(row(sigma_bn, i), rotation_vector_to_mrp(row(angles_b, i)))
+        sigma_out[i, 0], sigma_out[i, 1], sigma_out[i, 2] = s
 
 
 @kernel

@@ -11,10 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.attitude import dcm_to_mrp, mrp_to_rotation_vector
 from css_common.mission import Mission
 from css_common.random_streams import RandomKey, Stream, random_key, uniform4
 from css_common.schema import Values
-from css_common.vectors import Vec3, multiply
+from css_common.vectors import Vec3, mat3, multiply
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation import slit_measurement
 from css_estimation.slit_record import SlitRecord, read_record
@@ -122,6 +123,5 @@ def _attitude(
 
 
 def attitude_error(estimated: np.ndarray, true: np.ndarray) -> np.ndarray:
-    """(3,) rotation vector in b [rad] from an estimated to the true dcm_bn, to the second order in small angles."""
-    turn = true @ estimated.T
-    return 0.5 * np.array([turn[1, 2] - turn[2, 1], turn[2, 0] - turn[0, 2], turn[0, 1] - turn[1, 0]])
+    """(3,) rotation vector in b [rad] from an estimated to the true dcm_bn."""
+    return np.array(mrp_to_rotation_vector(dcm_to_mrp(mat3(true @ estimated.T))))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from css_common.attitude import mrp_to_dcm
+from css_common.attitude import mrp_to_dcm, quaternion_to_mrp
 from css_common.codec import Sample, codec_of, type_name
 from css_common.epochs import parse_utc
 from css_common.mission import Mission, mission_from_text
@@ -45,7 +45,7 @@ class SpinFlight:
 
     def attitude_times(self) -> np.ndarray:
         """(A,) instants [s after the epoch] of the attitudes."""
-        return np.array([(a.stamp_ns - self.mission.epoch_ns) * 1e-9 - a.age for a in self.attitudes])
+        return np.array([(a.stamp_ns - self.mission.epoch_ns) * 1e-9 - a.delay for a in self.attitudes])
 
 
 def fly_spinning(mission: Mission) -> SpinFlight:
@@ -116,5 +116,4 @@ def passages_of(angles: Sequence[Sample], values: Values) -> Passages:
 def attitude_matrix(q_bn: np.ndarray) -> np.ndarray:
     """(3, 3) dcm_bn of a quaternion (4,), scalar last."""
     x, y, z, w = q_bn.tolist()
-    k = 1.0 / (1.0 + w)  # the fourth is never negative
-    return np.array(mrp_to_dcm((k * x, k * y, k * z)))
+    return np.array(mrp_to_dcm(quaternion_to_mrp((x, y, z, w))))

@@ -41,7 +41,7 @@ class Triad(Component):
     """Attitude at each passage of the Sun, from its direction and the field at the same instant (TRIAD).
 
     The field is interpolated between samples, so an attitude goes out two samples after its instant: it is that of
-    `age` before the stamp. References are the Sun's ephemeris and IGRF at the flight's position.
+    `delay` before the stamp. References are the Sun's ephemeris and IGRF at the flight's position.
     """
 
     shared = ("orbit", "magnetometer")
@@ -157,10 +157,20 @@ class Triad(Component):
             vectors = {"q_bn": np.zeros(4), "omega_bn_b": np.zeros(3), "gyro_bias_b": np.zeros(3)}
             numbers = dict.fromkeys(("lit_mask", "nis_dof", "used", "mode"), 0)
             validity = AttitudeEstimate.VALIDITY_NONE
-            return {**vectors, **numbers, "covariance": no_covariance, "age": 0.0, "nis": 0.0, "validity": validity}
+            return {
+                **vectors,
+                **numbers,
+                "covariance": no_covariance,
+                "age": 0.0,
+                "delay": 0.0,
+                "nis": 0.0,
+                "validity": validity,
+            }
+        age = (stamp_ns - self._instant_ns) * 1e-9
         return {
             **self._newest,
-            "age": (stamp_ns - self._instant_ns) * 1e-9,
+            "age": age,
+            "delay": age,
             "validity": AttitudeEstimate.VALIDITY_VALID if fresh else AttitudeEstimate.VALIDITY_HELD,
         }
 
