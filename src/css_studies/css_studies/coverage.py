@@ -50,7 +50,9 @@ class CellMap(NamedTuple):
     wavg_error: np.ndarray  # (P, A) [rad] angle of the weighted average to the Sun; NaN: no estimate
 
 
-def grid_about(array_normal_b: Vec3, polar_cells: int = POLAR_CELLS, azimuth_cells: int = AZIMUTH_CELLS) -> Grid:
+def grid_about(
+    array_normal_b: Vec3, polar_cells: int = POLAR_CELLS, azimuth_cells: int = AZIMUTH_CELLS
+) -> Grid:
     """A grid about a unit vector in b; azimuth zero is towards the body's x axis (y, when x is the normal)."""
     third = np.asarray(array_normal_b, dtype=np.float64)
     start = np.eye(3)[0] if abs(third[0]) < 0.9 else np.eye(3)[1]

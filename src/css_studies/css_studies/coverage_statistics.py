@@ -30,7 +30,9 @@ class WavgErrors(NamedTuple):
     mean_deg: float | None  # over the directions with an estimate; None: there are none
     max_deg: float
     fraction_above_30: float  # of the sphere
-    polar_max_above_30: tuple[float, float] | None  # [deg] first and last ring with its largest error above 30 deg
+    polar_max_above_30: (
+        tuple[float, float] | None
+    )  # [deg] first and last ring with its largest error above 30 deg
     polar_mean_above_30: tuple[float, float] | None  # the same for the mean of the ring
     polar_all_above_30: tuple[float, float] | None  # the same for all of the ring
     max_within_deg: dict[str, float]  # half angle of a cone about the array normal to the largest error in it
@@ -68,7 +70,9 @@ def holes(grid: Grid, result: CellMap) -> list[Hole]:
         # a belt around the body has no middle
         x, y, z = middle / length if length > 1e-9 * fraction else np.zeros(3)
         half_angle = np.degrees(np.arccos(1.0 - 2.0 * fraction))
-        found.append(Hole((float(x), float(y), float(z)), fraction, 4.0 * np.pi * fraction, float(half_angle)))
+        found.append(
+            Hole((float(x), float(y), float(z)), fraction, 4.0 * np.pi * fraction, float(half_angle))
+        )
     return sorted(found, key=lambda hole: -hole.fraction)
 
 

@@ -216,7 +216,9 @@ def _in_order(mission: Mission) -> list[Node]:
         ready = [n for n in waiting if all(i.topic in known or i.topic not in published for i in n.inputs)]
         if not ready:
             names = ", ".join(node.name for node in waiting)
-            raise MissionError(f"{mission.origin}: {names} wait for each other, no order of calls serves them")
+            raise MissionError(
+                f"{mission.origin}: {names} wait for each other, no order of calls serves them"
+            )
         for node in ready:
             known.update(output.topic for output in node.outputs)
             waiting.remove(node)

@@ -71,7 +71,9 @@ def colours(count: int) -> Sequence[Colour]:
     return [tuple(c) for c in matplotlib.colormaps["viridis"](np.linspace(0.0, 0.92, count))]
 
 
-def draw_series(axes: Axes, x: np.ndarray, y: np.ndarray, colour: Colour, label: str = "", width: float = 1.0) -> None:
+def draw_series(
+    axes: Axes, x: np.ndarray, y: np.ndarray, colour: Colour, label: str = "", width: float = 1.0
+) -> None:
     """A line; of a long series the median of each of 600 bins, in a pale band from smallest to largest value.
 
     Rows without a number are gaps.

@@ -117,4 +117,7 @@ def _subject(log: FlightLog) -> str:
 def _labels(logs: Sequence[FlightLog]) -> list[str]:
     """Folder name of each flight, made different by a number where origins share theirs."""
     names = [Path(log.origin).stem or log.name for log in logs]
-    return [f"{name}_{names[: i + 1].count(name)}" if names.count(name) > 1 else name for i, name in enumerate(names)]
+    return [
+        f"{name}_{names[: i + 1].count(name)}" if names.count(name) > 1 else name
+        for i, name in enumerate(names)
+    ]

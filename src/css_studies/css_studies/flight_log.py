@@ -119,7 +119,9 @@ class FlightLog:
                 continue
             taken = getattr(self, attribute) is not None
             if taken:
-                self.notes.append(f"of several topics with {kind.__name__} one is taken, {usual} if it is there")
+                self.notes.append(
+                    f"of several topics with {kind.__name__} one is taken, {usual} if it is there"
+                )
             if not taken or topic == usual:
                 setattr(self, attribute, columns)
 
@@ -239,7 +241,9 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
             except MissionError as error:
                 notes.append(f"the recorded mission is not valid here: {error}")
         messages: dict[str, tuple[type, list[bytes]]] = {
-            topic.name: (LOGGED_TYPES[topic.type], []) for topic, _ in reader.topics if topic.type in LOGGED_TYPES
+            topic.name: (LOGGED_TYPES[topic.type], [])
+            for topic, _ in reader.topics
+            if topic.type in LOGGED_TYPES
         }
         if not messages:
             raise BagError(f"{path}: holds no truth, estimate, cell output, wheel or control message")

@@ -64,7 +64,9 @@ def shade_eclipse(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     shade_dark(axes, log.time(columns) / unit.scale, dark)
 
 
-def draw_heading_error(axes: Axes, log: FlightLog, unit: TimeAxis, name: str, colour: Colour, label: str) -> None:
+def draw_heading_error(
+    axes: Axes, log: FlightLog, unit: TimeAxis, name: str, colour: Colour, label: str
+) -> None:
     """Angle of estimated to true Sun; a stretch of steps without estimate is a gap in the line."""
     steps, errors = heading_errors(log, name)
     _draw_errors(axes, log, unit, steps, errors, colour, label)
@@ -80,7 +82,9 @@ def _draw_errors(axes, log: FlightLog, unit: TimeAxis, steps, errors, colour: Co
 
 def draw_pointing_error(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str = "") -> None:
     """Angle of array normal to true Sun."""
-    draw_series(axes, log.time(log.having("truth")) / unit.scale, np.degrees(log.pointing_error), colour, label)
+    draw_series(
+        axes, log.time(log.having("truth")) / unit.scale, np.degrees(log.pointing_error), colour, label
+    )
 
 
 def draw_true_rate(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str) -> None:

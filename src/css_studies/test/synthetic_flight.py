@@ -52,12 +52,16 @@ def estimates(sun_b: np.ndarray, **given: np.ndarray | float) -> Columns:
     return columns(SunEstimate, stamps(len(sun_b)), **({"sun_b": sun_b, "validity": 2} | given))
 
 
-def flight(pointing_deg: np.ndarray, illumination: np.ndarray | float = 1.0, **estimated: Columns) -> FlightLog:
+def flight(
+    pointing_deg: np.ndarray, illumination: np.ndarray | float = 1.0, **estimated: Columns
+) -> FlightLog:
     """A flight with a truth and some estimators."""
     return FlightLog("made up", truth=truth(pointing_deg, illumination), estimates=estimated)
 
 
-def record(folder: Path, topics: Mapping[str, tuple[type, Columns]], mission: str = "", frame: str = "bus") -> Path:
+def record(
+    folder: Path, topics: Mapping[str, tuple[type, Columns]], mission: str = "", frame: str = "bus"
+) -> Path:
     """A recording of columns, topic to type and columns."""
     metadata = {"mission": mission} if mission else None
     declared = [Topic(name, codec_of(kind).type_name) for name, (kind, _) in topics.items()]

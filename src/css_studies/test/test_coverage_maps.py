@@ -26,7 +26,9 @@ NO_CLIP = (0.0, 0.0, 0.0)
 def layout(**changes):
     """The default layout with changes to its cells, or to the gate of the average."""
     gate = {name: changes.pop(name) for name in ("gate", "gate_kind") if name in changes}
-    return layout_of(default_values(CssArray.table(), **changes), default_values(Wavg.table(), **changes, **gate))
+    return layout_of(
+        default_values(CssArray.table(), **changes), default_values(Wavg.table(), **changes, **gate)
+    )
 
 
 def directions(grid: Grid) -> np.ndarray:
@@ -112,7 +114,9 @@ def test_one_cell_leaves_one_hole_around_its_back(normal):
 def test_narrow_cells_on_a_cube_leave_its_corners_open():
     normals = np.vstack([np.eye(3), -np.eye(3)])
     # the corner is 54.7 deg from each face, the views end at 50
-    values = layout(cells__normals=normals.ravel(), cells__clip_normal=NO_CLIP, cells__field_of_view_deg=100.0)
+    values = layout(
+        cells__normals=normals.ravel(), cells__clip_normal=NO_CLIP, cells__field_of_view_deg=100.0
+    )
     grid = grid_about(Z, 360, 720)
     result = map_cells(values, grid)
     found = holes(grid, result)

@@ -20,7 +20,9 @@ Z = (0.0, 0.0, 1.0)
 def layout(**changes):
     """The default layout with changes to its cells, or to the gate of the average."""
     gate = {name: changes.pop(name) for name in ("gate", "gate_kind") if name in changes}
-    return layout_of(default_values(CssArray.table(), **changes), default_values(Wavg.table(), **changes, **gate))
+    return layout_of(
+        default_values(CssArray.table(), **changes), default_values(Wavg.table(), **changes, **gate)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,8 @@ def cases():
     mission = default_mission().with_overrides([TEN_MINUTES])
     return {
         estimator: [
-            estimator_runs(fly_directly(configured(mission, case=case, estimator=estimator)))[0] for case in CASES
+            estimator_runs(fly_directly(configured(mission, case=case, estimator=estimator)))[0]
+            for case in CASES
         ]
         for estimator in ("ekf", "wavg")
     }

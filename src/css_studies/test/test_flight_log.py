@@ -25,7 +25,9 @@ def random_columns(message_type: type, steps: int = STEPS) -> Columns:
     for name, values in vars(result).items():
         if name != "stamp_ns":
             values[...] = (
-                RANDOM.integers(0, 2, values.shape) if values.dtype.kind != "f" else RANDOM.normal(size=values.shape)
+                RANDOM.integers(0, 2, values.shape)
+                if values.dtype.kind != "f"
+                else RANDOM.normal(size=values.shape)
             )
     return result
 
@@ -37,7 +39,9 @@ def assert_equal(a: Columns, b: Columns) -> None:
 
 
 @pytest.mark.parametrize("frame", ["bus", "eci", "a_long_frame"])
-@pytest.mark.parametrize("message_type", [SpacecraftState, SunEstimate, CssVoltages, WheelState, ControlStatus])
+@pytest.mark.parametrize(
+    "message_type", [SpacecraftState, SunEstimate, CssVoltages, WheelState, ControlStatus]
+)
 def test_the_stacked_view_equals_decoding_each_message(message_type, frame):
     codec = codec_of(message_type)
     written = random_columns(message_type)
@@ -91,7 +95,9 @@ def test_body_vectors_against_scipy():
 
 def test_angles_are_accurate_at_both_ends():
     z = np.array([0.0, 0.0, 1.0])
-    np.testing.assert_allclose(angle(tilted([1e-7, 30.0, 180.0 - 1e-7]), z), np.radians([1e-7, 30.0, 180.0 - 1e-7]))
+    np.testing.assert_allclose(
+        angle(tilted([1e-7, 30.0, 180.0 - 1e-7]), z), np.radians([1e-7, 30.0, 180.0 - 1e-7])
+    )
 
 
 def full_recording(folder):
@@ -164,7 +170,9 @@ def test_remapped_topics(tmp_path):
 
 def test_a_second_truth_is_left_out_with_a_note(tmp_path):
     topics, folder = full_recording(tmp_path / "flight")
-    log = read_flight(record(folder, {"/other": (SpacecraftState, random_columns(SpacecraftState, 3))} | topics))
+    log = read_flight(
+        record(folder, {"/other": (SpacecraftState, random_columns(SpacecraftState, 3))} | topics)
+    )
     assert len(log.truth) == STEPS
     assert log.notes == ["of several topics with SpacecraftState one is taken, /truth if it is there"]
 

@@ -66,7 +66,9 @@ def test_acquisition_is_the_first_minute_within_thirty_degrees():
 def test_darkness_does_not_count():
     pointing = np.full(2000, 10.0)
     lit = np.repeat([1.0, 0.0], 1000)
-    run = estimator_runs(flight(pointing, lit, ekf=estimates(tilted(pointing + np.repeat([2.0, 60.0], 1000)))))[0]
+    run = estimator_runs(
+        flight(pointing, lit, ekf=estimates(tilted(pointing + np.repeat([2.0, 60.0], 1000))))
+    )[0]
     assert run["heading_error_p95_deg"] == pytest.approx(2.0)
     assert run["power_positive_s"] == 0.0
 
@@ -83,7 +85,9 @@ def test_a_flight_that_never_points_has_no_figures_of_acquisition():
 def test_within_thirty_degrees_in_the_dark_is_not_power_positive():
     run = estimator_runs(flight(np.repeat([50.0, 5.0], 100), np.repeat([1.0, 0.0], 100)))
     assert run == []
-    log = flight(np.repeat([50.0, 5.0], 100), np.repeat([1.0, 0.0], 100), ekf=estimates(tilted(np.zeros(200))))
+    log = flight(
+        np.repeat([50.0, 5.0], 100), np.repeat([1.0, 0.0], 100), ekf=estimates(tilted(np.zeros(200)))
+    )
     assert estimator_runs(log)[0]["power_positive_s"] is None
 
 
@@ -203,9 +207,14 @@ def test_criteria():
     assert criteria_failures({"heading_error_mean_deg": {"max": 2.4}}, runs) == [
         "ekf: heading_error_mean_deg is 3, above criteria.heading_error_mean_deg.max 2.4"
     ]
-    assert "below criteria.rate_final_deg_s.min" in criteria_failures({"rate_final_deg_s": {"min": 1.0}}, runs)[0]
+    assert (
+        "below criteria.rate_final_deg_s.min"
+        in criteria_failures({"rate_final_deg_s": {"min": 1.0}}, runs)[0]
+    )
     assert "has no value" in criteria_failures(met, [never])[0]
     assert "did you mean power_positive_s?" in criteria_failures({"power_positve_s": {"max": 1.0}}, runs)[0]
-    assert len(criteria_failures({"heading_error_mean_deg": {"max": 4.0}}, [beside])) == 1, "a replay: all are judged"
+    assert len(criteria_failures({"heading_error_mean_deg": {"max": 4.0}}, [beside])) == 1, (
+        "a replay: all are judged"
+    )
     assert criteria_failures(met, []) != []
     assert criteria_failures({}, []) == []

@@ -35,8 +35,12 @@ def _parser() -> argparse.ArgumentParser:
         dest="overrides",
         help="change one parameter, for instance --set cells.field_of_view_deg=140; may be repeated",
     )
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="write the maps as PNG files into this folder")
-    parser.add_argument("--json", action="store_true", help="print the numbers as one JSON object on the last line")
+    parser.add_argument(
+        "--figures", type=Path, metavar="DIR", help="write the maps as PNG files into this folder"
+    )
+    parser.add_argument(
+        "--json", action="store_true", help="print the numbers as one JSON object on the last line"
+    )
     return parser
 
 
@@ -75,7 +79,9 @@ def study(mission: Mission, figures: Path | None = None) -> tuple[dict[str, Any]
 
 
 def _print_tables(result: dict[str, Any], console: Console) -> None:
-    seen = Table(title=f"{result['mission']}: {result['cells']} cells", title_justify="left", box=box.SIMPLE_HEAD)
+    seen = Table(
+        title=f"{result['mission']}: {result['cells']} cells", title_justify="left", box=box.SIMPLE_HEAD
+    )
     seen.add_column("cells that see the Sun")
     seen.add_column("share of the sphere, %", justify="right")
     for count, fraction in enumerate(result["seen_by_fraction"]):

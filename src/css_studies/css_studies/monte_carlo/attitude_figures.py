@@ -26,7 +26,10 @@ SAMPLED = ("error_deg", "sigma_deg", "bias_error_deg_s", "lit")
 
 TALLY = np.dtype(
     [(name, np.int64) for name in ("first_step", "settled", "innovations")]
-    + [(name, np.float64) for name in ("error_sum", "error_max", "nees3_sum", "nees6_sum", "nis_sum", "bias_sum")],
+    + [
+        (name, np.float64)
+        for name in ("error_sum", "error_max", "nees3_sum", "nees6_sum", "nis_sum", "bias_sum")
+    ],
     align=True,
 )
 """Running sums of one filter in one case; angles in deg, rates in deg/s."""

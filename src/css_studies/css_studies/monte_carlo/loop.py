@@ -162,7 +162,9 @@ def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
                     gather_light(view_at(around.views, k), cases.reflectivity[c], light)
                 else:
                     e = environment
-                    point_source(v.albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, cases.reflectivity[c], light)
+                    point_source(
+                        v.albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, cases.reflectivity[c], light
+                    )
             else:
                 light = around.light[k]
             albedo_output(light, cells, v.cells.screen, v.cells.cos_half_view, dcm_bn, work, albedo)

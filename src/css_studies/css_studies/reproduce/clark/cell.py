@@ -7,6 +7,7 @@ import numpy as np
 
 from css_common.attitude import rotation_vector_to_mrp
 from css_common.mission import Mission
+from css_common.vectors import vector_of
 from css_environment.mission_environment import MissionEnvironment
 from css_studies.reproduce.okeefe.cells import ARRAY, Cells
 from css_studies.reproduce.rows import Row, row
@@ -34,8 +35,7 @@ class Cell:
         self._cells = Cells(mission, *_QUIET)
         self._normal = mission.values.cells.normals[0]
         around = MissionEnvironment(mission.values, field=False).at(0.0)
-        sun = tuple(float(c) for c in self._normal)
-        self._around = around._replace(sun_n=sun, solar_flux=1.0, illumination=1.0)
+        self._around = around._replace(sun_n=vector_of(self._normal), solar_flux=1.0, illumination=1.0)
         across = np.cross(self._normal, np.roll(self._normal, 1))
         self._axis = across / np.linalg.norm(across)
 
