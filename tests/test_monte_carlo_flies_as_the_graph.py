@@ -22,6 +22,13 @@ OVERRIDES = ["mission.duration=60.0", "orbit.true_anomaly_deg=269.75"]
 CASE = 7
 
 
+def trace_of_log(log, estimator):
+    """(steps, columns) of a recorded flight in the order of the loop's trace."""
+    truth, estimates = log.having("truth"), log.estimates[estimator]
+    columns = (truth.sigma_bn, truth.omega_bn_b, estimates.sun_b, estimates.omega_bn_b)
+    return np.hstack((*columns, log.having("torque_command").torque, log.having("wheels").speed))
+
+
 @pytest.mark.parametrize("estimator", ["ekf", "wavg", "wls"])
 def test_every_step_of_a_case_equals_that_of_the_composed_graph(estimator, tmp_path):
     text = find_mission("okeefe_2013").read_text().replace("    criteria:", EVENTS + "    criteria:")
@@ -29,20 +36,12 @@ def test_every_step_of_a_case_equals_that_of_the_composed_graph(estimator, tmp_p
     flown = configured(mission, case=CASE, estimator=estimator)
     fly_composed(flown, tmp_path / "bag")
     log = read_flight(tmp_path / "bag")
-    truth, estimates = log.having("truth"), log.estimates[estimator]
+    estimates = log.estimates[estimator]
     assert not log.sunlit[0] and log.sunlit[-1]
 
     flight = MissionFlight(configured(mission, estimator=estimator))
     trace = fly_cases(flight, np.array([3, CASE, 9]), 10, traced=True).trace[1]
-    columns = (
-        truth.sigma_bn,
-        truth.omega_bn_b,
-        estimates.sun_b,
-        estimates.omega_bn_b,
-        log.having("torque_command").torque,
-        log.having("wheels").speed,
-    )
-    np.testing.assert_array_equal(trace, np.hstack(columns))
+    np.testing.assert_array_equal(trace, trace_of_log(log, estimator))
     assert len(trace) == 600
     sources = np.unique(estimates.rate_source)
     assert len(sources) == 3, "the flight has steps with gyro, with rates from the Sun and without any"
@@ -53,19 +52,11 @@ def test_safe_hold_with_magnetometer_and_rods_equals_the_composed_graph(tmp_path
     mission = load_mission("clark_1996_pyramid", ["mission.duration=150.0", "orbit.true_anomaly_deg=43.0"])
     fly_composed(configured(mission, case=CASE), tmp_path / "bag")
     log = read_flight(tmp_path / "bag")
-    truth, estimates = log.having("truth"), log.estimates["pyramid_switch"]
+    estimates = log.estimates["pyramid_switch"]
     assert not log.sunlit[0] and log.sunlit[-1]
     assert np.any(log.having("control").dumping)
     assert SunEstimate.RATE_FIELD in estimates.rate_source
 
     trace = fly_cases(MissionFlight(mission), np.array([CASE]), 10, traced=True).trace[0]
-    columns = (
-        truth.sigma_bn,
-        truth.omega_bn_b,
-        estimates.sun_b,
-        estimates.omega_bn_b,
-        log.having("torque_command").torque,
-        log.having("wheels").speed,
-    )
-    np.testing.assert_array_equal(trace, np.hstack(columns))
+    np.testing.assert_array_equal(trace, trace_of_log(log, "pyramid_switch"))
     assert len(trace) == 300

@@ -4,26 +4,8 @@
 import numpy as np
 import pyarrow as pa
 
-CASE_QUANTITIES = (
-    "converging_s",
-    "converging_first_s",
-    "converging_later_s",
-    "acquired_s",
-    "heading_error_mean_deg",
-    "heading_error_p95_deg",
-    "heading_error_late_deg",
-    "pointing_error_mean_deg",
-    "rate_final_deg_s",
-    "rate_50min_deg_s",
-    "rate_knowledge_50min_deg_s",
-    "wheel_momentum_max",
-    "wheel_momentum_final",
-    "nees_mean",
-    "nis_mean",
-    "pointing_error_sunlit_deg",
-    "heading_error_sunlit_deg",
-)
-QUANTITIES = ("heading_error_deg", "pointing_error_deg", "rate_deg_s", "rate_knowledge_deg_s")
+from css_studies.monte_carlo.case_figures import SAMPLED
+from css_studies.monte_carlo.case_table import FIGURES
 
 
 def case_table(configurations, cases, values=None, seed=1):
@@ -33,7 +15,7 @@ def case_table(configurations, cases, values=None, seed=1):
     for configuration in configurations:
         given = (values or {}).get(configuration, {})
         for case in range(cases):
-            row = {name: float(random.uniform(0.0, 2.0)) for name in CASE_QUANTITIES}
+            row = {name: float(random.uniform(0.0, 2.0)) for name in FIGURES}
             row |= {name: column[case] for name, column in given.items()}
             rows.append(_key(configuration) | {"case": case, "steps_without_estimate": 0} | row)
     return pa.Table.from_pylist(rows)
@@ -43,7 +25,7 @@ def percentile_table(configurations, time_s, value=lambda configuration, quantit
     """Table `percentiles`: the mean is as given, the 95th percentile twice that."""
     rows = []
     for configuration in configurations:
-        for quantity in QUANTITIES:
+        for quantity in SAMPLED:
             means = value(configuration, quantity, time_s)
             for time, mean in zip(time_s, means, strict=True):
                 spread = {
