@@ -12,7 +12,7 @@ import numpy as np
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel, outer_kernel
 from css_common.random_streams import RandomKey
-from css_common.vectors import Mat3, Vec3, multiply, row
+from css_common.vectors import Mat3, Vec3, mat3, multiply
 from css_environment.albedo import albedo_output
 from css_environment.albedo_vector import PATCHES, point_source
 from css_environment.earth_light import gather_light
@@ -94,11 +94,6 @@ def trace_columns(wheels: int) -> int:
 
 
 @kernel
-def _mat3(m) -> Mat3:
-    return (row(m, 0), row(m, 1), row(m, 2))
-
-
-@kernel
 def case_key(cases: Cases, c: int) -> RandomKey:
     """Key of the draws of a case."""
     return RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
@@ -106,7 +101,7 @@ def case_key(cases: Cases, c: int) -> RandomKey:
 
 @outer_kernel
 def _case_spacecraft(v: Vehicle, cases: Cases, c: int) -> Spacecraft:
-    body = RigidBody(_mat3(cases.inertia[c]), _mat3(cases.inertia_inverse[c]), cases.wheels[c], v.substeps)
+    body = RigidBody(mat3(cases.inertia[c]), mat3(cases.inertia_inverse[c]), cases.wheels[c], v.substeps)
     return Spacecraft(body, v.disturbances, v.rod_axes_b, v.rod_max_dipole, v.disturbed)
 
 
