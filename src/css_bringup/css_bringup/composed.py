@@ -9,7 +9,7 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
 from css_bringup.flight import FlightResult, Progress, Stopped
-from css_common.executor import create_executor, spin_until
+from css_common.executor import create_executor, retire, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
@@ -72,8 +72,7 @@ class ComposedFlight:
         if self.recorder is not None:
             self.recorder.close()
         for node in (*self.nodes.values(), *filter(None, [self.recorder])):
-            self.executor.remove_node(node)
-            node.destroy_node()
+            retire(self.executor, node)
         self.executor.shutdown()
         self.context.try_shutdown()
 

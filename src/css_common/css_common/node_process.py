@@ -115,6 +115,8 @@ class _Process:
 
     def end(self) -> None:
         """Gives everything up, the executor first: the middleware calls into it from threads of its own."""
+        if self._node is not None:
+            self._node.stop_listening()
         if self._executor is not None:
             self._executor.shutdown()
         if self._node is not None:
@@ -200,9 +202,7 @@ def describe(component_type: type[Component]) -> str:
         for i in component_type.inputs(name, values)
     ] or ["  nothing"]
     lines += ["", "Publishes:"]
-    lines += [
-        f"  {o.topic}  {type_name(o.message_type)}" for o in component_type.outputs(name, values)
-    ]
+    lines += [f"  {o.topic}  {type_name(o.message_type)}" for o in component_type.outputs(name, values)]
     lines += ["  /diagnostics  diagnostic_msgs/msg/DiagnosticArray", "", "Parameters (* may change in flight):"]
     for p in component_type.table():
         default = p.default if not (p.is_array and len(p.default) > 6) else f"{len(p.default)} values"

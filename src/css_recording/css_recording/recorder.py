@@ -22,13 +22,13 @@ from rclpy.subscription import Subscription
 from css_common.codec import type_name
 from css_common.diagnostics import Diagnostics, Health
 from css_common.mission import Mission
-from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
+from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION, matching_qos
 from css_recording.bag_metadata import Topic, absolute
 from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.flight_recorder import FlightRecorder
 from css_recording.provenance import software_versions
-from css_recording.ros_topics import matching_qos, message_class_of, recorded_qos
+from css_recording.ros_topics import message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
 
 PARAMETER_EVENTS = "/parameter_events"

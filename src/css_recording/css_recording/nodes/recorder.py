@@ -13,7 +13,7 @@ import rclpy
 from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
 
-from css_common.executor import create_executor, spin_until
+from css_common.executor import create_executor, retire, spin_until
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_common.stop_signal import StopSignal
@@ -70,8 +70,7 @@ def _record(options: argparse.Namespace, mission: Mission | None, folder: Path, 
         print(_summary(node, folder), flush=True)
         if options.summary:
             Path(options.summary).write_text(json.dumps(_figures(node)), encoding="utf-8")
-        executor.remove_node(node)
-        node.destroy_node()
+        retire(executor, node)
     return 1 if node.failure else 0
 
 
