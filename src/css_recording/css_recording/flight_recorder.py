@@ -99,11 +99,15 @@ class FlightRecorder:
                 self._release(stamp_ns)
         self.writer.write(topic, stamp_ns, data)
 
-    def close(self) -> None:
-        """Finishes the recording."""
+    def close(self, notes: Mapping[str, str] | None = None) -> None:
+        """Finishes the recording.
+
+        Args:
+            notes: what is known only now, for the record `sunpoint_flight` and `custom_data` of `metadata.yaml`.
+        """
         if not self.writer.closed:
             self._release(None)
-        self.writer.close()
+        self.writer.close(notes)
 
     def _count_step(self, topic: str, step_ns: int) -> None:
         if step_ns > self._spacing_ns[topic]:
