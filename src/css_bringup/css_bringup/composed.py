@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
-from css_bringup.flight import FlightResult, Progress, Stopped
+from css_bringup.flight import FlightResult, Progress, Stopped, as_flown
 from css_common.executor import create_executor, retire, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
@@ -54,11 +54,15 @@ class ComposedFlight:
     def __enter__(self) -> "ComposedFlight":
         self.context.init()
         self.executor = create_executor(self._executor_kind, self.context)
-        mission = self.mission
+        mission = as_flown(self.mission, recorded=self.bag is not None)
         if self.bag is not None:
-            mission = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
             self.recorder = RecorderNode(
-                self.mission, self.bag, overwrite=self._overwrite, context=self.context, use_global_arguments=False
+                self.mission,
+                self.bag,
+                overwrite=self._overwrite,
+                in_flight=True,
+                context=self.context,
+                use_global_arguments=False,
             )
             self.executor.add_node(self.recorder)
         for node in mission.nodes:

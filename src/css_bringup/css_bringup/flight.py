@@ -68,6 +68,14 @@ class FlightResult:
         return lost
 
 
+def as_flown(mission: Mission, *, recorded: bool) -> Mission:
+    """A mission as its nodes get it in a flight: only nodes of the graph are heard, and a recorder is waited for."""
+    overrides = ["io.writers=graph"]
+    if recorded:
+        overrides += [f"lockstep.recorders={mission.values.lockstep.recorders + 1}", "lockstep.wait_for_recorder=true"]
+    return mission.with_overrides(overrides)
+
+
 def default_bag(mission: Mission, folder: Path | None = None) -> Path:
     """A fresh recording folder `bags/MISSION_case_TIME`, in the project when there is one."""
     root = folder or Path(os.environ.get("SUNPOINT_HOME", ".")) / "bags"

@@ -18,7 +18,7 @@ from typing import IO, Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
-from css_bringup.flight import FlightResult, Stopped
+from css_bringup.flight import FlightResult, Stopped, as_flown
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 
@@ -120,11 +120,11 @@ class Supervisor:
         self.failure = ""
         self._folder = tempfile.TemporaryDirectory(prefix="sunpoint_")
         logs.mkdir(parents=True, exist_ok=True)
-        flown = mission
-        if bag is not None:
-            flown = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
-        self._parameters = Path(self._folder.name) / f"{mission.name}.yaml"
+        flown = as_flown(mission, recorded=bag is not None)
+        self._parameters = Path(self._folder.name) / f"{mission.name}.flown.yaml"
         self._parameters.write_text(flown.text(), encoding="utf-8")
+        self._mission_file = Path(self._folder.name) / f"{mission.name}.yaml"
+        self._mission_file.write_text(mission.text(), encoding="utf-8")
         self.children = {node.name: self._child(node.name, node.package, node.executable) for node in flown.nodes}
         self.recorder = self._recorder() if bag is not None else None
 
@@ -137,7 +137,7 @@ class Supervisor:
         return Path(self._folder.name) / f"{name}.summary.json"
 
     def _recorder(self) -> Child:
-        command = [executable_path("css_recording", RECORDER), "--mission", str(self._parameters)]
+        command = [executable_path("css_recording", RECORDER), "--mission", str(self._mission_file), "--in-flight"]
         command += ["--output", str(self.bag), "--summary", str(self._summary(RECORDER))]
         command += ["--overwrite"] if self._overwrite else []
         return Child(RECORDER, command, self.logs / f"{RECORDER}.log")

@@ -16,6 +16,9 @@ LOOP_PUBLISHER = QoSProfile(
 )
 """Topics of the control loop: a node that was restarted receives the stamp that waits for its answer."""
 
+PROGRESS_TOPIC = "recorder/progress"
+"""`std_msgs/Header`: the stamp up to which the recorder of a flight has every message."""
+
 LOOP_SUBSCRIPTION = QoSProfile(
     history=HistoryPolicy.KEEP_LAST,
     depth=10 * HISTORY,

@@ -11,7 +11,7 @@ The names of rclpy that are not public stand in this file alone: `Node._subscrip
 """
 
 import copy
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
@@ -25,12 +25,14 @@ from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
+from css_common.edge import HISTORY
 from css_common.qos import matching_qos
 from css_common.raw_take import take_with_writer
 from css_common.writers import Writer, WriterChoice
 
 _TAKE_EVERY = 0.001
 _LOOK_AGAIN_AFTER = 20  # takes
+_NAMELESS = "a node without a name"
 _UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 _REFUSED_TOPIC = "_refused"  # hidden, and nobody writes it
 
@@ -76,6 +78,7 @@ class SoleSubscription:
         self._choice = choice
         self._on_hand_over = on_hand_over
         self._named: set[Writer] = set()
+        self._kept: dict[bytes, deque[bytes]] = {}
         self._nobody: Any = None
         self._timer: Timer | None = None
         self._takes = 0
@@ -163,6 +166,7 @@ class SoleSubscription:
             self.handed_over += 1
             self._report(f"{self.topic}: {self._name(self._choice.accepted)} took over")
             self._on_hand_over()
+            self._hear_kept()
         self._name_strangers()
         if self._choice.accepted is not None and not self._choice.strangers:
             self._take_waiting()
@@ -173,11 +177,7 @@ class SoleSubscription:
             self._start_taking()
 
     def _present(self) -> list[Writer]:
-        return [
-            Writer(bytes(found.endpoint_gid), _node_name(found))
-            for found in self._node.get_publishers_info_by_topic(self.topic)
-            if qos_check_compatible(found.qos_profile, self._qos)[0] != QoSCompatibility.ERROR
-        ]
+        return writers_of(self._node, self.topic, self._qos)
 
     def _name_strangers(self) -> None:
         for stranger in self._choice.strangers:
@@ -191,7 +191,7 @@ class SoleSubscription:
 
     @staticmethod
     def _name(writer: Writer | None) -> str:
-        return (writer.node or "a node without a name") if writer is not None else "the node that the mission names"
+        return (writer.node or _NAMELESS) if writer is not None else "the node that the mission names"
 
     def _report(self, text: str) -> None:
         self._node.get_logger().info(text)
@@ -226,11 +226,23 @@ class SoleSubscription:
             if accepted is not None and gid == accepted.gid:
                 self._callback(data)
             else:
-                self._refuse(gid)
+                self._refuse(data, gid)
 
-    def _refuse(self, gid: bytes) -> None:
+    def _refuse(self, data: bytes, gid: bytes) -> None:
         node = next((w.node for w in (*self._choice.strangers, *self._named) if w.gid == gid), "")
-        self.refused[node or "a node without a name"] += 1
+        self.refused[node or _NAMELESS] += 1
+        if self._choice.accepted is not None and node and node == self._choice.accepted.node:
+            # perhaps a node that was restarted where its old process cannot be seen
+            self._kept.setdefault(gid, deque(maxlen=HISTORY)).append(data)
+
+    def _hear_kept(self) -> None:
+        accepted = self._choice.accepted
+        kept = self._kept.pop(accepted.gid, ()) if accepted is not None else ()
+        self._kept.clear()
+        for data in kept:
+            self.refused[accepted.node] -= 1  # type: ignore[union-attr]
+            self._callback(data)
+        self.refused = +self.refused
 
     # The executor's share
 
@@ -283,6 +295,15 @@ class SoleSubscription:
         self._ended = False
         self._subscription = self._subscribe(adapted, None)
         self._look()
+
+
+def writers_of(node: Node, topic: str, asked: QoSProfile | None = None) -> list[Writer]:
+    """Writers of a topic that the middleware knows, of those only that offer what a subscription asks for."""
+    return [
+        Writer(bytes(found.endpoint_gid), _node_name(found))
+        for found in node.get_publishers_info_by_topic(topic)
+        if asked is None or qos_check_compatible(found.qos_profile, asked)[0] != QoSCompatibility.ERROR
+    ]
 
 
 def _nothing(_: object) -> None:

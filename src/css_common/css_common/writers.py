@@ -48,11 +48,20 @@ def _runs(process: str) -> bool:
     return text.rpartition(")")[2].split()[:1] not in (["Z"], ["X"])
 
 
-def writer_choice(mission: Mission, topic: str, namespace: str) -> WriterChoice:
-    """Who may speak on a topic of a mission, heard from nodes of a namespace."""
+def writer_choice(mission: Mission, topic: str, namespace: str, *, only: bool | None = None) -> WriterChoice:
+    """Who may speak on a topic of a mission.
+
+    Args:
+        mission: names the node that publishes each topic of its graph.
+        topic: relative name, as in the mission.
+        namespace: of the listening node, and so of the graph.
+        only: whether the node of the graph alone may speak; None: as the mission says (`io.writers`).
+    """
     name = mission.publishers.get(topic, "")
     node = f"{namespace.rstrip('/')}/{name}" if name else ""
-    return WriterChoice(node, only=mission.values.io.writers == "graph" and bool(node))
+    if only is None:
+        only = mission.values.io.writers == "graph"
+    return WriterChoice(node, only=only and bool(node))
 
 
 class WriterChoice:
@@ -84,10 +93,10 @@ class WriterChoice:
 
         Args:
             present: all writers of the topic.
-            processes: gives the low 16 bits of the numbers of running processes; asked only when there are several.
+            processes: gives the low 16 bits of the numbers of running processes; asked when there is anybody new.
         """
         writers = list(present)
-        running = self._without_dead(writers, processes) if len(writers) > 1 else writers
+        running = self._without_dead(writers, processes)
         took_over = False
         kept = next((w for w in running if self.accepted is not None and w.gid == self.accepted.gid), None)
         if kept is None:
@@ -121,16 +130,23 @@ class WriterChoice:
         return next(iter(heir or running), None)
 
     def _without_dead(self, writers: list[Writer], processes: Callable[[], frozenset[int]]) -> list[Writer]:
+        if len(writers) < 2 and all(writer.gid in self._seen_running for writer in writers):
+            return writers  # it stays while the middleware knows it
         now = processes()
         running = []
         for writer in writers:
-            process = _process_of(writer.gid)
-            if process is None or process in now:
+            if runs(writer, now):
                 self._seen_running.add(writer.gid)
             elif writer.gid in self._seen_running:
                 continue  # it ran here and does so no more; one that never did may run in another container
             running.append(writer)
         return running
+
+
+def runs(writer: Writer, processes: frozenset[int]) -> bool:
+    """Whether a writer's process is one of those that run on this machine, as far as its GID tells."""
+    process = _process_of(writer.gid)
+    return process is None or process in processes
 
 
 def _process_of(gid: bytes) -> int | None:

@@ -202,3 +202,17 @@ def test_ended_subscription_hears_nothing_in_either_state(listener):
     send(ours, 2)
     listener.bench.until(lambda: ours.get_subscription_count() == 0, "nobody listens")
     assert listener.heard == [1]
+
+
+def test_successor_whose_predecessor_is_forgotten_late_loses_nothing(listener):
+    old = listener.sender("ours")
+    send(old, 1)
+    listener.until_heard(1)
+    new = listener.sender("ours")
+    send(new, 2, 3)
+    listener.until_refused("/ours", 2)
+    listener.end("ours", old)
+    send(new, 4)
+    listener.until_heard(1, 2, 3, 4)
+    assert listener.hand_overs == [1]
+    assert not listener.subscription.refused

@@ -81,7 +81,7 @@ def test_restarted_node_takes_over_from_its_dead_process_and_not_from_a_living_o
 def test_process_that_was_never_seen_here_may_run_elsewhere():
     heard = choice()
     far, near = Writer(gid(1, 100), "/driver"), Writer(gid(2, 200), "/driver")
-    heard.update([far], running(200))
+    heard.update([far], running())
     heard.update([far, near], running(200))
     assert (heard.accepted, heard.strangers) == (far, (near,))
 

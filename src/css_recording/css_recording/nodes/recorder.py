@@ -58,7 +58,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _record(options: argparse.Namespace, mission: Mission | None, folder: Path, stop: StopSignal) -> int:
     everything = options.all or not (options.mission or options.topic)
-    node = RecorderNode(mission, folder, options.topic, everything=everything, overwrite=options.overwrite)
+    node = RecorderNode(
+        mission,
+        folder,
+        options.topic,
+        everything=everything,
+        overwrite=options.overwrite,
+        in_flight=options.in_flight,
+    )
     executor = create_executor()
     executor.add_node(node)
     try:
@@ -104,6 +111,9 @@ def _summary(node: RecorderNode, folder: Path) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("recorder", description=_DESCRIPTION, epilog=_EPILOG)
     parser.add_argument("--mission", metavar="NAME|FILE", help="record every topic that its graph publishes")
+    parser.add_argument(
+        "--in-flight", action="store_true", help="the mission is being flown and waits for this recorder"
+    )
     parser.add_argument("--set", metavar="KEY=VALUE", action="append", default=[], help="override a mission value")
     parser.add_argument("--topic", action="append", default=[], help="record this topic; may be repeated")
     parser.add_argument("--all", action="store_true", help="record every topic that appears (default without others)")
