@@ -9,13 +9,14 @@ from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
 from css_bringup.flight import FlightResult, Progress, Stopped, as_flown
+from css_bringup.incidents import node_incidents
 from css_common.executor import create_executor, retire, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.node_process import create_node
 from css_common.plant_host import PlantNode
-from css_recording.recorder import RecorderNode
+from css_recording.recorder import INCIDENTS, RecorderNode
 
 _PROGRESS_EVERY = 0.2
 
@@ -128,15 +129,17 @@ class ComposedFlight:
         flown_ns = plant.stamp_ns - self.mission.epoch_ns if plant.begun else -self.mission.period_ns
         result.steps = flown_ns // self.mission.period_ns + 1
         result.simulated_s = result.steps * self.mission.period_ns * 1e-9
+        result.notes += node_incidents(self.mission, {n: node.health().counters for n, node in self.nodes.items()})
         if self.recorder is not None:
             self._drain(self.recorder)
-            self.recorder.close()
+            faults = self.recorder.faults()
+            self.recorder.close({INCIDENTS: "\n".join((*result.notes, *faults)) or "none"})
+            result.notes += [f"recorder: {fault}" for fault in faults]
             topics = {f"/{topic}" for topic in self.mission.topics}
             result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
             if self.recorder.failure:
                 result.failure = f"the flight is not recorded any more: {self.recorder.failure}"
-        if plant.counters["partners_lost"]:
-            result.notes.append(f"{plant.counters['partners_lost']} partners fell silent")
+        result.note_losses()
 
     def _drain(self, recorder: RecorderNode) -> None:
         # what was published last is still on its way: take until nothing more comes

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from css_bringup.incidents import lost_messages
 from css_common.mission import Mission
 
 Progress = Callable[[float], None]
@@ -30,7 +31,7 @@ class FlightResult:
         recorded: messages recorded, by absolute topic name.
         failure: why the flight ended early; empty on a good end.
         interrupted: the user asked it to end.
-        notes: what happened that a reader should know (restarts, partners lost).
+        notes: what was not as it should be (restarts, refusals, silence, losses); a flight that has any did not go well.
     """
 
     mission: Mission
@@ -59,13 +60,13 @@ class FlightResult:
         """Messages that the cycles flown must have produced and the recording lacks."""
         if self.bag is None:
             return 0
-        lost = 0
-        for topic, output in self.mission.outputs.items():
-            if output.events:
-                continue  # how many there were is not known from the cycles
-            expected = -(-self.steps // output.divider)
-            lost += max(0, expected - self.recorded.get(f"/{topic}", 0))
-        return lost
+        return sum(lost_messages(self.mission, self.steps, self.recorded).values())
+
+    def note_losses(self) -> None:
+        """Adds to the notes what the recording lacks."""
+        if self.bag is not None:
+            lost = lost_messages(self.mission, self.steps, self.recorded)
+            self.notes += [f"{topic}: {count} messages are not in the recording" for topic, count in lost.items()]
 
 
 def as_flown(mission: Mission, *, recorded: bool) -> Mission:

@@ -35,6 +35,11 @@ from css_common.schema import ParameterError, Values, shaped_values
 from css_common.sole_subscription import SoleSubscription
 from css_common.writers import writer_choice
 
+REJECTED = ".rejected."
+"""Between an input and the kind of refusal, in the names of counters."""
+STRANGER = ".stranger."
+"""Between a topic and the node that wrote it besides the one that is heard, in the names of counters."""
+
 _SUCCESS = TransitionCallbackReturn.SUCCESS
 _FAILURE = TransitionCallbackReturn.FAILURE
 # Durability too: drivers publish volatile, which a subscription to a topic of the loop would never match.
@@ -384,8 +389,12 @@ class ComponentNode(LifecycleNode):
         counters = dict(self.counters)
         for key, edge in self.edges.items():
             counters[f"{key}.accepted"] = edge.accepted
+            counters[f"{key}.repeated"] = edge.repeated
             for kind, count in edge.rejected.items():
-                counters[f"{key}.rejected.{kind}"] = count
+                counters[f"{key}{REJECTED}{kind}"] = count
+        for subscription in self.subscriptions_made:
+            for node, count in subscription.refused.items():
+                counters[f"{subscription.topic}{STRANGER}{node}"] = count
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
@@ -393,5 +402,7 @@ class ComponentNode(LifecycleNode):
             return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
         if any(edge.rejected for edge in self.edges.values()):
             return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
+        if any(subscription.refused for subscription in self.subscriptions_made):
+            return Health(DiagnosticStatus.WARN, "other nodes write its topics too", counters, self._last_stamp)
         state = "active" if self._is_active else "inactive"
         return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)

@@ -9,6 +9,7 @@ recorder also says how far it has come, and the plant does not go far ahead of t
 Of a topic of the mission the messages of one writer are recorded; those of others are counted.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from rclpy.subscription import Subscription
 
 from css_common.codec import type_name
 from css_common.diagnostics import Diagnostics, Health
+from css_common.epochs import format_utc
 from css_common.mission import Mission
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION, matching_qos
 from css_common.sole_subscription import SoleSubscription
@@ -38,6 +40,13 @@ from css_recording.ros_topics import message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
 
 PARAMETER_EVENTS = "/parameter_events"
+INCIDENTS = "incidents"
+"""Entry of a recording that says what was not as it should be in the flight, one a line, or `none`."""
+_MEANING = {
+    "repeated": "with the stamp of the one before",
+    "back": "with a stamp earlier than the one before",
+    "late": "too late for their place in the recording, kept out of order",
+}
 _LOOK_EVERY = 0.02
 _DISCOVER_EVERY = 0.2
 _WARN_AFTER = 5.0
@@ -121,9 +130,9 @@ class RecorderNode(Node):
         return self._recorder.message_count
 
     @property
-    def counters(self) -> dict[str, int]:
+    def counters(self) -> Counter[str]:
         """What was not as it should be: gaps, stamps out of order, messages later than the hold-back time."""
-        return {**self._recorder.counters, "late": self._recorder.writer.late_messages}
+        return Counter(self._recorder.counters, late=self._recorder.writer.late_messages)
 
     @property
     def gaps(self) -> dict[str, Gap]:
@@ -135,6 +144,18 @@ class RecorderNode(Node):
         """Messages of other writers than the accepted one, by topic and node; they are not recorded."""
         sole = {t: s for t, s in self._subscribed.items() if isinstance(s, SoleSubscription)}
         return {topic: dict(subscription.refused) for topic, subscription in sole.items() if subscription.refused}
+
+    def faults(self) -> list[str]:
+        """What is missing or was left out, in one line each."""
+        lines = [
+            f"{topic}: {gap.missing} messages missing, the first stamped {format_utc(gap.first_ns)}"
+            for topic, gap in self.gaps.items()
+        ]
+        for topic, strangers in self.refused.items():
+            lines += [f"{topic}: {count} messages of {node} not recorded" for node, count in strangers.items()]
+        counted = self.counters
+        lines += [f"{counted[key]} messages {text}" for key, text in _MEANING.items() if counted[key]]
+        return lines
 
     def health(self) -> Health:
         """Level, one line and counters for /diagnostics."""

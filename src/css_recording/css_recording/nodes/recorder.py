@@ -6,6 +6,7 @@ import json
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from css_common.stop_signal import StopSignal
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
 from css_recording.process import split_arguments
-from css_recording.recorder import RecorderNode
+from css_recording.recorder import INCIDENTS, RecorderNode
 
 _DESCRIPTION = """\
 Record topics into an MCAP recording in rosbag2 layout, until SIGINT or SIGTERM. Log times are the stamps of the
@@ -73,7 +74,7 @@ def _record(options: argparse.Namespace, mission: Mission | None, folder: Path, 
         spin_until(executor, lambda: stop.came or bool(node.failure))
         _drain(executor, node)
     finally:
-        node.close()
+        node.close(_notes(options.notes, node))
         print(_summary(node, folder), flush=True)
         if options.summary:
             Path(options.summary).write_text(json.dumps(_figures(node)), encoding="utf-8")
@@ -92,10 +93,20 @@ def _drain(executor: Executor, node: RecorderNode) -> None:
             executor.spin_once(timeout_sec=_QUIET_S / 10)
 
 
+def _notes(file: str | None, node: RecorderNode) -> dict[str, str]:
+    """What the flight was like, as its supervisor left it, and what the recorder itself lacks."""
+    lines = node.faults()
+    if file is not None:
+        with suppress(OSError):  # a supervisor that died leaves none
+            lines = [*json.loads(Path(file).read_text(encoding="utf-8")), *lines]
+    return {INCIDENTS: "\n".join(lines) or "none"}
+
+
 def _figures(node: RecorderNode) -> dict[str, Any]:
     return {
         "recorded": node.counts,
         "counters": node.counters,
+        "faults": node.faults(),
         "failure": node.failure,
         "cpu_s": time.process_time(),
     }
@@ -119,6 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--all", action="store_true", help="record every topic that appears (default without others)")
     parser.add_argument("-o", "--output", metavar="FOLDER", help="default: bags/NAME_TIME in the project")
     parser.add_argument("--overwrite", action="store_true", help="replace a recording that is there")
+    parser.add_argument("--notes", metavar="FILE", help="JSON list of lines to keep in the recording, read at its end")
     parser.add_argument("--summary", metavar="FILE", help="leave the figures of the recording in a JSON file")
     return parser
 
