@@ -53,7 +53,7 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
         cpu_s=result.cpu_s,
         recorded=result.messages_recorded,
         lost=result.messages_lost,
-    )
+    ) | {"domain": result.domain}
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:

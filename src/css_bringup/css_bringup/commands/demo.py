@@ -13,10 +13,11 @@ from pathlib import Path
 from css_bringup.commands.replay import print_replay
 from css_bringup.figures import print_figures
 from css_bringup.flight import default_bag
-from css_bringup.flying import fly
+from css_bringup.flying import fly, own_domain
 from css_bringup.options import (
     FAILED,
     INTERRUPTED,
+    add_domain_option,
     add_mission_options,
     add_output_options,
     complain,
@@ -39,6 +40,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add_mission_options(parser)
+    add_domain_option(parser)
     add_output_options(parser)
     parser.add_argument("--figures", type=Path, metavar="DIR", help="where figures go (default: beside the recording)")
     return parser
@@ -58,7 +60,9 @@ def _run(arguments: argparse.Namespace) -> int:
         f"nodes {', '.join(node.name for node in mission.nodes)}",
         soft_wrap=True,
     )
-    flight = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite)
+    with own_domain(mission, arguments.domain, bag, console) as domain:
+        flight = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite)
+    flight.domain = domain
     if flight.interrupted:
         errors.print(f"interrupted; the recording up to here is complete: {bag}", soft_wrap=True)
         return INTERRUPTED

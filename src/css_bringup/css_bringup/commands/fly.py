@@ -5,10 +5,11 @@ import argparse
 import sys
 
 from css_bringup.flight import FlightResult, default_bag
-from css_bringup.flying import fly
+from css_bringup.flying import fly, own_domain
 from css_bringup.options import (
     FAILED,
     INTERRUPTED,
+    add_domain_option,
     add_mission_options,
     add_output_options,
     complain,
@@ -35,6 +36,7 @@ def _parser() -> argparse.ArgumentParser:
         help="pace against the wall clock (default factor 1.0)",
     )  # fmt: skip
     parser.add_argument("--no-record", action="store_true", help="fly without a recording and figures of merit")
+    add_domain_option(parser)
     add_output_options(parser)
     return parser
 
@@ -50,7 +52,9 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
-    result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+    with own_domain(mission, arguments.domain, bag, console) as domain:
+        result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+    result.domain = domain
     return conclude(mission, result, as_json=arguments.json)
 
 
