@@ -55,8 +55,10 @@ Quick start (the first command sets everything up inside this folder, once):
 Usage: ./sunpoint VERB [ARGUMENTS]
 {table}
 
-./sunpoint VERB --help explains one verb, ./sunpoint --version says what this is. A flight has a ROS domain for
-itself; shell, record and play join it, or --flight NAME|PID when several are running, or --domain N."""
+A flight has a ROS domain for itself. shell, record and play join it; when several are running,
+--flight NAME|PID or --domain N chooses.
+
+./sunpoint VERB --help explains one verb, ./sunpoint --version says which version this is."""
 
 
 OWN_USAGE = {

@@ -14,6 +14,7 @@ import json
 import os
 import socket
 import struct
+import textwrap
 from collections.abc import Iterator, Mapping, MutableMapping
 from datetime import UTC, datetime
 from pathlib import Path
@@ -209,7 +210,7 @@ def _command(pid: int) -> str:
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
     except OSError:
         return "of another user"
-    return b" ".join(words).decode(errors="replace").strip() or "without a name"
+    return textwrap.shorten(b" ".join(words).decode(errors="replace"), 100) or "without a name"
 
 
 def _discovery_ports(domain: int) -> set[int]:
