@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every way to fly a mission gives back, and where its recording goes."""
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
 from css_bringup.incidents import lost_messages
+from css_common import places
 from css_common.mission import Mission
 
 Progress = Callable[[float], None]
@@ -31,7 +31,8 @@ class FlightResult:
         recorded: messages recorded, by absolute topic name.
         failure: why the flight ended early; empty on a good end.
         interrupted: the user asked it to end.
-        notes: what was not as it should be (restarts, refusals, silence, losses); a flight that has any did not go well.
+        notes: what was not as it should be (restarts, refusals, silence, losses).
+        domain: ROS domain that it had for itself; None when nobody chose one.
     """
 
     mission: Mission
@@ -44,6 +45,7 @@ class FlightResult:
     failure: str = ""
     interrupted: bool = False
     notes: list[str] = field(default_factory=list)
+    domain: int | None = None
 
     @property
     def realtime_factor(self) -> float:
@@ -79,7 +81,7 @@ def as_flown(mission: Mission, *, recorded: bool) -> Mission:
 
 def default_bag(mission: Mission, folder: Path | None = None) -> Path:
     """A fresh recording folder `bags/MISSION_case_TIME`, in the project when there is one."""
-    root = folder or Path(os.environ.get("SUNPOINT_HOME", ".")) / "bags"
+    root = folder or places.results("bags")
     now = datetime.now(UTC).strftime("%Y%m%d_%H%M%S")
     base = root / f"{mission.name}_{mission.values.mission.case}_{now}"
     bag, n = base, 1

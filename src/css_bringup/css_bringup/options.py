@@ -9,8 +9,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
+from css_common.domains import DomainError
 from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError
+from css_common.network import NetworkError
 from css_common.schema import unknown_name
 from css_recording.errors import BagError
 from css_studies.flight_metrics import QUANTITIES
@@ -36,6 +38,13 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change one parameter, for instance --set ekf.use_gyro=false; may be repeated",
     )  # fmt: skip
+
+
+def add_domain_option(parser: argparse.ArgumentParser) -> None:
+    """Where a flight has its world for itself."""
+    parser.add_argument(
+        "--domain", metavar="N", help="ROS domain to fly in (default: ROS_DOMAIN_ID when set, else a free one)"
+    )
 
 
 def mission_of(arguments: argparse.Namespace) -> Mission:
@@ -92,7 +101,7 @@ def guarded(command: Callable[[], int]) -> int:
     """Runs a command; what the user got wrong becomes one line and exit code 2, Ctrl-C becomes 130."""
     try:
         return command()
-    except (MissionError, BagError, FiguresError) as error:
+    except (MissionError, BagError, FiguresError, DomainError, NetworkError) as error:
         complain("error:", error)
         return USAGE
     except KeyboardInterrupt:

@@ -54,7 +54,7 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
         cpu_s=result.cpu_s,
         recorded=result.messages_recorded,
         lost=result.messages_lost,
-    ) | {"failure": result.failure, "incidents": result.notes}
+    ) | {"domain": result.domain, "failure": result.failure, "incidents": result.notes}
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:
@@ -74,9 +74,11 @@ def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) ->
 
 
 def print_incidents(result: FlightResult) -> None:
-    """What was not as it should be: the last lines of a flight."""
+    """What was not as it should be, and why it ended early: the last lines of a flight."""
     for note in result.notes:
         complain("not as it should be:", note)
+    if result.failure:
+        complain("the flight failed:", result.failure)
 
 
 def print_json(value: Mapping[str, Any]) -> None:

@@ -23,6 +23,7 @@ from css_common.plant_host import PlantNode
 from css_common.schema import ParameterError, default_values, unknown_name
 from css_common.sections import GRAPH
 from css_common.stop_signal import StopSignal
+from css_common.supervised import beat
 
 USAGE_ERROR = 2
 # Wall times [s] at the end: for answers to the last stamp of a plant; for what is on its way to another node, and
@@ -117,6 +118,7 @@ class _Process:
         """Gives everything up, the executor first: the middleware calls into it from threads of its own."""
         if self._node is not None:
             self._node.stop_listening()
+        beat()
         if self._executor is not None:
             self._executor.shutdown()
         if self._node is not None:

@@ -132,7 +132,7 @@ class RecorderNode(Node):
     @property
     def counters(self) -> Counter[str]:
         """What was not as it should be: gaps, stamps out of order, messages later than the hold-back time."""
-        return Counter(self._recorder.counters, late=self._recorder.writer.late_messages)
+        return self._recorder.counters + Counter(late=self._recorder.writer.late_messages)
 
     @property
     def gaps(self) -> dict[str, Gap]:

@@ -9,7 +9,6 @@ again, and ends with the same bytes. `fly MISSION --case K` flies one of the cas
 import argparse
 import itertools
 import json
-import os
 import signal
 import sys
 import time
@@ -21,6 +20,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from css_common import places
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
@@ -150,8 +150,7 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
 
 
 def _default_folder(mission: str) -> Path:
-    home = Path(os.environ.get("SUNPOINT_HOME", "."))
-    return home / "studies" / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
+    return places.results("studies") / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
 
 
 _COLUMNS = (
