@@ -46,6 +46,8 @@ class PlantNode(ComponentNode):
         self._begun = False
         self._recorded_ns: int | None = None
         self._waiting_since = time.monotonic()
+        self._looked = self._silent_for = 0.0
+        self._looked_at = 0
         self._warned: set[str] = set()
         self._startup_timer: Timer | None = None
         self._pace_timer: Timer | None = None
@@ -88,7 +90,8 @@ class PlantNode(ComponentNode):
             self._subscribe(Header, PROGRESS_TOPIC, self._note_recorded)
         if lockstep.publish_clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
-        self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)
+        self._watch_every = min(0.5, 0.5 * lockstep.warn_after)
+        self._watch = self.create_timer(self._watch_every, self._watch_partners, clock=self._steady)
         # A step in which nobody is waited for goes on by a timer: the executor must get to partners that come back.
         self._go_on_timer = self.create_timer(1e-4, self._go_on, clock=self._steady)
         self._go_on_timer.cancel()
@@ -308,10 +311,19 @@ class PlantNode(ComponentNode):
 
     # Partners that fall silent
 
+    def _silence(self) -> float:
+        """Wall time [s] of waiting while this node looked on; time in which it did not run itself is no silence."""
+        now = time.monotonic()
+        begin = max(self._waiting_since, self._looked, now - 2.0 * self._watch_every)
+        self._looked = now
+        self._silent_for = (self._silent_for if self._looked_at == self._stamp else 0.0) + now - begin
+        self._looked_at = self._stamp
+        return self._silent_for
+
     def _watch_partners(self) -> None:
         if not self._begun or self.done or not self._is_active or self._held_back is not None:
             return
-        silent_for = time.monotonic() - self._waiting_since
+        silent_for = self._silence()
         lockstep = self.component.values.lockstep
         missing = [self._awaited[key] for key in self._needed() if key not in self._answers]
         not_recorded = not missing and self._is_ahead_of_recorder()

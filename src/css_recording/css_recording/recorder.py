@@ -195,7 +195,8 @@ class RecorderNode(Node):
                 topic = self.resolve_topic_name(name)
                 self._expected[topic] = output.message_type
                 self._names[topic] = name
-                spacing_ns[topic] = output.divider * mission.period_ns
+                if not output.events:
+                    spacing_ns[topic] = output.divider * mission.period_ns
                 recorded.append(Topic(topic, type_name(output.message_type), (recorded_qos(LOOP_PUBLISHER),)))
             if mission.plant is not None:
                 self._last = {self.resolve_topic_name(output.topic) for output in mission.plant.outputs}
