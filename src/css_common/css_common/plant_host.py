@@ -331,11 +331,12 @@ class PlantNode(ComponentNode):
             missing = [PROGRESS_TOPIC]
         if silent_for < lockstep.warn_after or not missing:
             return
-        if silent_for >= lockstep.hold_limit and not_recorded:
+        # the recorder gives up a topic after the same limit, and must get to say so
+        if silent_for >= 2.0 * lockstep.hold_limit and not_recorded:
             self.failed = f"the recorder has said nothing for {silent_for:.1f} s"
             self.get_logger().error(self.failed)
             self.done = True
-        elif silent_for >= lockstep.hold_limit:
+        elif silent_for >= lockstep.hold_limit and not not_recorded:
             self.get_logger().error(
                 f"no {', '.join(missing)} for {silent_for:.1f} s: going on without, actuators at rest until it is back"
             )
