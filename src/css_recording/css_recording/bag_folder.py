@@ -39,7 +39,9 @@ def prepare_folder(folder: Path, overwrite: bool) -> None:
         for path in sorted(contents, key=lambda path: path.name != METADATA_FILE):
             path.unlink()
     except OSError as error:
-        raise BagError(f"{folder}: cannot create the recording: {error.strerror}") from error
+        raise BagError(
+            f"{folder}: cannot create the recording: {error.strerror}; choose a folder in which you may write"
+        ) from error
 
 
 def create_file(path: Path) -> IO[bytes]:
