@@ -6,7 +6,7 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -71,16 +71,6 @@ Received = Mapping[str, Any]
 """Input key to `Sample`; None for an optional input that is silent and for one that is not due."""
 Outgoing = Mapping[str, Sample | tuple[Sample, ...]]
 """Output key to its message of the step, or to those of an output of events."""
-
-
-def messages_of(outgoing: Outgoing) -> Iterator[tuple[str, Sample]]:
-    """Each message that a component gave, with the key of its output."""
-    for key, given in outgoing.items():
-        if isinstance(given, tuple):
-            for sample in given:
-                yield key, sample
-        else:
-            yield key, given
 
 
 def _unheard(text: str) -> None:
