@@ -32,6 +32,8 @@ class Input:
         lengths: expected length of array fields; another length is refused at the edge.
         used: fields that the component reads and that must be finite; empty: all. Drivers leave NaN in others.
         frame: whose frame_id is expected, `BODY` or `INERTIAL`.
+        heeded: False while the values make nothing of it (a gyro that is not to be used): its messages are then
+            neither waited for nor handed over, whatever they are. May change when values do.
     """
 
     key: str
@@ -42,6 +44,7 @@ class Input:
     lengths: Mapping[str, int] = field(default_factory=dict)
     used: tuple[str, ...] = ()
     frame: str = BODY
+    heeded: bool = True
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ Shared by live nodes and replay. Rejections are counted by kind; the first of ea
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
 
 from css_common.codec import DecodeError, Sample, codec_of
 from css_common.component import INERTIAL, Component, Input
@@ -141,6 +142,18 @@ class Edge:
             self._report(f"{self.source.topic}: {kind}: {detail} (further ones are counted, not reported)")
 
 
+class Missed(NamedTuple):
+    """How often a message was missed, and where first."""
+
+    times: int
+    first_ns: int
+
+
+def _note(notes: dict[str, Missed], topic: str, stamp: int) -> None:
+    before = notes.get(topic)
+    notes[topic] = Missed(1, stamp) if before is None else Missed(before.times + 1, min(stamp, before.first_ns))
+
+
 class Matcher:
     """Brings the inputs of one cycle together by their stamps.
 
@@ -156,25 +169,45 @@ class Matcher:
             component: whose steps decide which inputs are due, and which begins anew when time goes back.
             inputs: all inputs; the first one paces the cycle when matching by the latest.
             awaited: keys without which an exact cycle does not run (required ones, and optional ones that
-                have a publisher).
+                have a publisher), as far as they are heeded.
         """
         self.inputs = {i.key: i for i in inputs}
-        self.awaited = frozenset(awaited)
         self.exact = component.values.io.input_matching == "exact"
-        self.deadline_ns = round(component.values.io.deadline * 1e9)
         self.unmatched = 0
         self.set_back = 0
+        self._present = frozenset(awaited)
         self._pacing = next(iter(self.inputs), None)
         self._component = component
         self._divided = any(i.divider > 1 for i in self.inputs.values())
-        self._speaking = self.awaited  # without optional inputs that let a deadline pass
         self._pending: dict[int, dict[str, Sample]] = {}
         self._latest: dict[str, Sample] = {}
         self._newest: dict[str, int] = {}
         self._done = _NEVER
+        self._missed: dict[str, Missed] = {}
+        self._late: dict[str, Missed] = {}
+        self.awaited: frozenset[str] = frozenset()
+        self._speaking = self.awaited  # without optional inputs that let a deadline pass
+        self._heed(self.inputs)
+
+    def retune(self) -> None:
+        """Takes over what new values of the component say about deadline and inputs."""
+        component = self._component
+        self._heed({i.key: i for i in type(component).inputs(component.name, component.values)})
+
+    def _heed(self, inputs: Mapping[str, Input]) -> None:
+        """Waits from now on for the inputs that are heeded and present."""
+        self.deadline_ns = round(self._component.values.io.deadline * 1e9)
+        self._unheeded = frozenset(key for key, source in inputs.items() if not source.heeded)
+        awaited = self._present - self._unheeded
+        self._speaking = (self._speaking & awaited) | (awaited - self.awaited)
+        self.awaited = awaited
+        for key in self._unheeded:
+            self._latest.pop(key, None)
 
     def offer(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         """Takes a message; returns the cycles that are now complete, oldest first."""
+        if key in self._unheeded:
+            return []
         if not self.exact:
             return self._offer_latest(key, sample)
         stamp = sample.stamp_ns
@@ -187,6 +220,7 @@ class Matcher:
             # others are late, or come from a clock that never agreed with theirs: neither may stop the cycle.
             if not went_back or self._done - stamp < self.deadline_ns:
                 self.unmatched += 1
+                _note(self._late, self.inputs[key].topic, stamp)
                 return []
             self._begin_anew()
         slots = self._pending.setdefault(stamp, {})
@@ -194,7 +228,7 @@ class Matcher:
         if not slots.keys() >= self._due(stamp):
             if len(self._pending) > _MOST_PENDING:
                 # the one that waits longest; by stamp, leftovers of a time ahead would push out every new one
-                self.unmatched += len(self._pending.pop(next(iter(self._pending))))
+                self._give_up(next(iter(self._pending)))
             return []
         return [self._complete(stamp)]
 
@@ -212,6 +246,31 @@ class Matcher:
                 ready.append(self._complete(stamp))
         return ready
 
+    def released(self) -> list[tuple[int, dict[str, Sample | None]]]:
+        """Cycles that have all that is waited for since `retune`, oldest first."""
+        ready = [stamp for stamp, slots in self._pending.items() if slots.keys() >= self._due(stamp)]
+        return [self._complete(stamp) for stamp in sorted(ready) if stamp in self._pending]
+
+    def give_up(self) -> None:
+        """Counts what still waits as unmatched: nothing more will come."""
+        for stamp in list(self._pending):
+            self._give_up(stamp)
+
+    def complaints(self) -> list[str]:
+        """Why messages were not used: which partners did not come, or which came too late; a line each."""
+        remedy = "io.input_matching=latest pairs messages of different stamps" if self.exact else "see io.deadline"
+        lines = [
+            f"{topic}: missing in {missed.times} cycles, which did not run, the first at stamp {missed.first_ns} ns "
+            f"({remedy})"
+            for topic, missed in self._missed.items()
+        ]
+        lines += [
+            f"{topic}: {late.times} messages came when the cycle of their stamp was over, the first at stamp "
+            f"{late.first_ns} ns ({remedy})"
+            for topic, late in self._late.items()
+        ]
+        return lines
+
     def oldest_pending(self) -> int | None:
         """Stamp of the oldest incomplete cycle."""
         return min(self._pending, default=None)
@@ -223,6 +282,12 @@ class Matcher:
         oldest = min(self._pending)
         missing = self._due(oldest) - self._pending[oldest].keys()
         return [i.topic for i in self.inputs.values() if i.key in missing]
+
+    def _give_up(self, stamp: int) -> None:
+        slots = self._pending.pop(stamp)
+        self.unmatched += len(slots)
+        for key in self._due(stamp) - slots.keys():
+            _note(self._missed, self.inputs[key].topic, stamp)
 
     def _begin_anew(self) -> None:
         self._pending.clear()
@@ -240,7 +305,7 @@ class Matcher:
     def _complete(self, stamp: int) -> tuple[int, dict[str, Sample | None]]:
         slots = self._pending.pop(stamp)
         for older in [s for s in self._pending if s < stamp]:
-            self.unmatched += len(self._pending.pop(older))
+            self._give_up(older)
         self._done = stamp
         return stamp, {key: slots.get(key) for key in self.inputs}
 
@@ -258,6 +323,7 @@ class Matcher:
             fresh = held is not None and abs(stamp - held.stamp_ns) <= self.deadline_ns
             if entry.required and not fresh:
                 self.unmatched += 1
+                _note(self._missed, entry.topic, stamp)
                 return []
             received[name] = held if fresh else None
         self._done = stamp

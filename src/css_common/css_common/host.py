@@ -106,6 +106,7 @@ class ComponentNode(LifecycleNode):
         self._output_ports: dict[str, tuple] = {}
         self.subscriptions_made: list[SoleSubscription] = []
         self._seen_errors: set[str] = set()
+        self._performing = False
         self._last_stamp = 0
         self._began: tuple[float, float] | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -198,6 +199,7 @@ class ComponentNode(LifecycleNode):
         published = self.mission.topics
         awaited = [i.key for i in inputs if i.required or i.topic in published]
         self.matcher = Matcher(self.component, inputs, awaited)
+        self.stepper.tuned = self.matcher.retune
         for output in self.component_type.outputs(name, values):
             self._output_ports[output.key] = self._create_output(output)
         for source in inputs:
@@ -353,6 +355,13 @@ class ComponentNode(LifecycleNode):
 
     def _perform(self, event: Event) -> None:
         """Does what a scripted event says, by the same ways as an operator."""
+        self._performing = True
+        try:
+            self._do(event)
+        finally:
+            self._performing = False
+
+    def _do(self, event: Event) -> None:
         self.get_logger().info(f"event {event.name} at {event.time:g} s: {event.action} {event.parameter}".rstrip())
         if event.action == "set":
             (result,) = self.set_parameters([RosParameter(event.parameter, value=event.value)])
@@ -373,9 +382,11 @@ class ComponentNode(LifecycleNode):
         if self.stepper is None:
             return
         self.stepper.tune(canonical)
-        self.matcher.deadline_ns = round(self.component.values.io.deadline * 1e9)
         if self._deadline_timer is not None:
             self._deadline_timer.timer_period_ns = self.matcher.deadline_ns
+        if not self._performing:  # else a cycle is under way, and the next ones come after it
+            for stamp_ns, received in self.matcher.released():
+                self._run(stamp_ns, received)
 
     # Health
 

@@ -5,6 +5,7 @@ Live nodes, flights in one process and replay step components through this and n
 a component in flight happens to it everywhere.
 """
 
+import copy
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -149,13 +150,28 @@ class Stepper:
         self.is_active = False
         self._begins_anew = True
 
+    def snapshot(self) -> Any:
+        """All that the coming steps hang on, for `restore`."""
+        return copy.deepcopy(self._memory())
+
+    def restore(self, snapshot: Any) -> None:
+        """Goes back to a snapshot, which may be used again; it may be that of another stepper of the same kind."""
+        state, self.canonical, self.is_active, self._begins_anew, self._waiting = copy.deepcopy(snapshot)
+        # the component stays the one that others know
+        vars(self.component).clear()
+        vars(self.component).update(state)
+        self.tuned()
+
+    def _memory(self) -> tuple:
+        return vars(self.component), self.canonical, self.is_active, self._begins_anew, self._waiting
+
     def set_values(self, changes: Mapping[str, Any]) -> None:
         """Changes some parameters, if they agree with the others.
 
         Raises:
             ParameterError: they do not; nothing changes.
         """
-        reason = conflict(type(self.component), self.canonical | changes)
+        reason = conflict(type(self.component), {**self.canonical, **changes})
         if reason is not None:
             raise ParameterError(reason)
         self.tune(changes)

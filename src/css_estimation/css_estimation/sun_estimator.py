@@ -38,7 +38,7 @@ class SunEstimator(Component):
                 CssVoltages,
                 lengths={"voltages": len(values.cells.normals)},
             ),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
+            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), heeded=values.use_gyro),
         ]
         if values.rate.use_field:
             inputs.append(

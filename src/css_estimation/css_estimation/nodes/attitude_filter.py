@@ -25,7 +25,7 @@ class AttitudeFilter(Component):
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         return (
             Input("cells", "css/voltages", CssVoltages, lengths={"voltages": len(values.cells.normals)}),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
+            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), heeded=values.use_gyro),
             Input(
                 "field",
                 "mag/field",
