@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Replay of flights in which something changed: scripted events, parameters set and nodes switched by an operator."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -159,7 +158,9 @@ def test_the_step_at_which_an_operator_set_a_parameter_is_found(tmp_path):
 
 
 def test_an_estimator_that_an_operator_switched_off_and_on_began_anew_and_that_is_named(tmp_path):
-    switch: Callable[[int], ChangeState.Request] = lambda number: ChangeState.Request(transition=Transition(id=number))
+    def switch(number: int) -> ChangeState.Request:
+        return ChangeState.Request(transition=Transition(id=number))
+
     operated(
         tmp_path / "bag",
         (20.0, ChangeState, "ekf/change_state", switch(Transition.TRANSITION_DEACTIVATE)),
