@@ -107,6 +107,8 @@ class ComponentNode(LifecycleNode):
         self.subscriptions_made: list[SoleSubscription] = []
         self._seen_errors: set[str] = set()
         self._performing = False
+        self._waiting_stamp: int | None = None
+        self._unmet_reported = False
         self._last_stamp = 0
         self._began: tuple[float, float] | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -410,5 +412,23 @@ class ComponentNode(LifecycleNode):
             return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
         if any(subscription.refused for subscription in self.subscriptions_made):
             return Health(DiagnosticStatus.WARN, "other nodes write its topics too", counters, self._last_stamp)
+        unmet = self._unmet()
+        if unmet:
+            return Health(DiagnosticStatus.WARN, unmet, counters, self._last_stamp)
         state = "active" if self._is_active else "inactive"
         return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)
+
+    def _unmet(self) -> str:
+        """Which messages did not come, for cycles that did not run or have waited since the last look; warns once."""
+        if self.matcher is None:
+            return ""
+        lines = self.matcher.complaints()
+        waiting = self.matcher.oldest_pending()
+        if waiting is not None and waiting == self._waiting_stamp:
+            lines.append(f"stamp {waiting} ns waits for {', '.join(self.matcher.missing())}")
+        self._waiting_stamp = waiting
+        text = "; ".join(lines)
+        if text and not self._unmet_reported:
+            self._unmet_reported = True
+            self.get_logger().warning(f"{text} (what follows is in /diagnostics)")
+        return text
