@@ -6,7 +6,7 @@ matching of stamps and the same scripted events. The estimator that flew therefo
 """
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest, parse_request
@@ -79,14 +79,22 @@ class Replay:
     @property
     def rejected(self) -> dict[str, dict[str, int]]:
         """Messages refused at the edge, by topic and kind."""
-        rejected: dict[str, dict[str, int]] = {}
+        return self._counted(lambda edge: edge.rejected)
+
+    @property
+    def missing(self) -> dict[str, dict[str, int]]:
+        """Readings that counted as missing in messages that were taken, by topic, field and kind."""
+        return self._counted(lambda edge: edge.missing)
+
+    def _counted(self, of: Callable[[Edge], Mapping[str, int]]) -> dict[str, dict[str, int]]:
+        counted: dict[str, dict[str, int]] = {}
         for topic, listeners in self._listeners.items():
             for edge, _ in listeners:
-                kinds = rejected.setdefault(topic, {})
-                for kind, count in edge.rejected.items():
+                kinds = counted.setdefault(topic, {})
+                for kind, count in of(edge).items():
                     # several edges of a topic have seen the same messages
                     kinds[kind] = max(count, kinds.get(kind, 0))
-        return {topic: kinds for topic, kinds in rejected.items() if kinds}
+        return {topic: kinds for topic, kinds in counted.items() if kinds}
 
     def run(self, writer: BagWriter | None, copied: Iterable[str] = ("/truth",)) -> float:
         """Reads the recording once; returns the processor time of reading and stepping [s].

@@ -33,6 +33,7 @@ class ReplayResult:
         replayed: one entry an estimator.
         runs: figures of merit, in the same order.
         rejected: messages refused at the edge, by topic and kind.
+        missing: readings that counted as missing, by topic, field and kind.
         reports: one line for each kind of refusal.
         elsewhere: what differs between the software of the flight and this one; empty: nothing.
         simulated_s: time from the first to the last stamp that was replayed [s].
@@ -47,6 +48,7 @@ class ReplayResult:
     replayed: list[Replayed]
     runs: list[Run]
     rejected: Mapping[str, Mapping[str, int]]
+    missing: Mapping[str, Mapping[str, int]]
     reports: list[str]
     elsewhere: str
     simulated_s: float
@@ -81,6 +83,7 @@ class ReplayResult:
             "replayed": [_replayed_object(run) for run in self.replayed],
             "shortcomings": self.shortcomings,
             "rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()},
+            "missing_readings": {topic: dict(kinds) for topic, kinds in self.missing.items()},
         }
 
 
@@ -146,6 +149,7 @@ def replay(
         stepping.runs,
         runs,
         stepping.rejected,
+        stepping.missing,
         stepping.reports,
         elsewhere,
         (stepping.last_ns - stepping.first_ns) * 1e-9,

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 from css_common.codec import Sample
 from css_common.epochs import parse_utc
+from css_common.readings import Readings
 from css_common.schema import Table, Values
 from css_common.sections import SECTIONS
 
@@ -32,6 +33,8 @@ class Input:
         lengths: expected length of array fields; another length is refused at the edge.
         used: fields that the component reads and that must be finite; empty: all. Drivers leave NaN in others.
         frame: whose frame_id is expected, `BODY` or `INERTIAL`.
+        readings: array fields whose elements may each be missing (NaN), and what the others may be; an element beyond
+            that becomes NaN, a message without any reading is refused.
         heeded: False while the values make nothing of it (a gyro that is not to be used): its messages are then
             neither waited for nor handed over, whatever they are. May change when values do.
     """
@@ -44,6 +47,7 @@ class Input:
     lengths: Mapping[str, int] = field(default_factory=dict)
     used: tuple[str, ...] = ()
     frame: str = BODY
+    readings: Mapping[str, Readings] = field(default_factory=dict)
     heeded: bool = True
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from css_common.codec import DecodeError, Sample, codec_of
 from css_common.component import INERTIAL, Component, Input
+from css_common.readings import ReadingCheck
 from css_common.schema import Values
 
 Report = Callable[[str], None]
@@ -95,8 +96,15 @@ class Edge:
         # a message that is due less often than that must not count as one from another time
         largest_gap = max(io.largest_gap, 2.0 * values.mission.period * source.divider)
         self.guard = StampGuard(round(largest_gap * 1e9))
-        self._finite_fields = self.codec.real_fields(source.used)
+        self._finite_fields = [f for f in self.codec.real_fields(source.used) if f.name not in source.readings]
+        self._checks = [ReadingCheck(source.topic, name, may_be, report) for name, may_be in source.readings.items()]
+        self._incomplete: list[ReadingCheck] = []
         self._report = report
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Elements of arrays that counted as missing, by field and kind."""
+        return {f"{check.name}.{kind}": count for check in self._checks for kind, count in check.counts.items()}
 
     def accept(self, data: bytes) -> Sample | None:
         """The message in `data`, or None when it was rejected."""
@@ -113,6 +121,8 @@ class Edge:
                 self._reject(*refusal)
             return None
         self.accepted += 1
+        for check in self._incomplete:
+            check.clear(getattr(sample, check.name))
         return sample
 
     def begin_again(self) -> None:
@@ -130,6 +140,12 @@ class Edge:
         bad = self.codec.first_not_finite(self._finite_fields, sample)
         if bad is not None:
             return "not_finite", f"{bad} holds NaN or infinity"
+        if self._checks:
+            self._incomplete = [check for check in self._checks if not check.is_whole(getattr(sample, check.name))]
+            for check in self._incomplete:
+                reason = check.refusal(getattr(sample, check.name))
+                if reason is not None:
+                    return "not_finite", reason
         # last, so that a rejected message does not move the clock that its successors are measured by
         refusal = self.guard.refusal(sample.stamp_ns)
         if refusal is not None:

@@ -400,6 +400,8 @@ class ComponentNode(LifecycleNode):
             counters[f"{key}.repeated"] = edge.repeated
             for kind, count in edge.rejected.items():
                 counters[f"{key}{REJECTED}{kind}"] = count
+            for kind, count in edge.missing.items():
+                counters[f"{key}.{kind}"] = count
         for subscription in self.subscriptions_made:
             for node, count in subscription.refused.items():
                 counters[f"{subscription.topic}{STRANGER}{node}"] = count

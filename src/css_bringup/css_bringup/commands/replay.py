@@ -98,7 +98,10 @@ def print_replay(result: ReplayResult) -> None:
         for line in _lines(run, result.elsewhere):
             console.print(f"{run.label}: {line}", soft_wrap=True)
     for line in result.reports:
-        console.print(f"refused: {line}", soft_wrap=True)
+        console.print(f"noted: {line}", soft_wrap=True)
+    for topic, kinds in result.missing.items():
+        counted = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
+        console.print(f"readings of {topic} that counted as missing: {counted}", soft_wrap=True)
     rate = result.messages / result.cpu_s if result.cpu_s > 0.0 else 0.0
     console.print(
         f"{result.messages} estimates in {result.wall_s:.1f} s ({rate:.0f} a CPU second): {result.bag}", soft_wrap=True
