@@ -10,7 +10,7 @@ from css_bringup.estimator_request import EstimatorRequest
 from css_bringup.flight_changes import ParameterChange, RecordedSetting, settings_in_flight
 from css_bringup.retracing import Given, Retrace
 from css_common.component import Input, Output
-from css_common.edge import Matcher
+from css_common.matching import Matcher
 from css_common.mission import Event, Mission, Node, find_component
 from css_common.schema import shaped_values
 from css_common.stepping import Stepper

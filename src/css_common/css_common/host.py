@@ -28,7 +28,8 @@ from css_common import ros_parameters
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Outgoing, Output, Plant
 from css_common.diagnostics import Diagnostics, Health
-from css_common.edge import Edge, Matcher
+from css_common.edge import Edge
+from css_common.matching import Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_common.schema import ParameterError, Values
