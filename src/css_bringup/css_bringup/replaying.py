@@ -17,7 +17,7 @@ from css_common.mission import Mission, default_mission, load_mission, mission_f
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.provenance import software_versions
-from css_studies.flight_log import FlightLog, read_flight
+from css_studies.flight_log import IMPORTED_FROM, FlightLog, read_flight
 from css_studies.flight_metrics import Run, estimator_runs
 
 
@@ -133,6 +133,8 @@ def replay(
     with BagReader(source, remap) as reader:
         stepping = Replay(reader, mission, requests, overrides)
         metadata = {"mission": mission.text(), "replay_of": str(source), **software_versions()}
+        if IMPORTED_FROM in reader.description:
+            metadata[IMPORTED_FROM] = reader.description[IMPORTED_FROM]
         metadata["estimators"] = json.dumps({run.label: dict(run.node.canonical) for run in stepping.runs})
         wall = time.perf_counter()
         with BagWriter(bag, metadata=metadata, overwrite=overwrite) as writer:

@@ -93,7 +93,9 @@ def _remapping(text: str) -> tuple[str, str]:
 def print_replay(result: ReplayResult) -> None:
     """The comparison as a table, with what was refused and whether bytes are as they flew."""
     console.print(summary_table(result.runs))
-    console.print(f"parameters: {result.mission.origin}", soft_wrap=True)
+    console.print(f"mission: {result.mission.origin}", soft_wrap=True)
+    if result.log.imported:
+        console.print("imported telemetry: errors over all lines; of arrays, orbit and shadow nothing is known")
     for run in result.replayed:
         for line in _lines(run, result.elsewhere):
             console.print(f"{run.label}: {line}", soft_wrap=True)
