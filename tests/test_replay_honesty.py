@@ -194,9 +194,7 @@ def test_a_gyro_that_is_not_used_may_be_broken_in_any_way(tmp_path, capsys, kind
 
 
 def test_a_topic_of_another_type_is_refused_by_name_where_it_is_used(tmp_path, capsys):
-    bag = rewritten(
-        tmp_path / "bag", on("/gyro/imu", untouched), {"/gyro/imu": "sensor_msgs/msg/MagneticField"}
-    )
+    bag = rewritten(tmp_path / "bag", on("/gyro/imu", untouched), {"/gyro/imu": "sensor_msgs/msg/MagneticField"})
     assert command.main([str(bag), "--out", str(tmp_path / "out"), "--estimators", "ekf"]) == 2
     errors = " ".join(capsys.readouterr().err.split())
     assert "topic /gyro/imu is sensor_msgs/msg/MagneticField, ekf expected sensor_msgs/msg/Imu" in errors

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimates of a replay against those that flew, message by message, matched by the stamps of their headers."""
 
+from bisect import bisect_left
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,8 +14,7 @@ class Comparison:
     """Bytes that flew against bytes that the replay gives.
 
     Attributes:
-        compared: stamps that both have.
-        different: those of them whose bytes differ, in the order in which they were replayed.
+        different: stamps that both have and whose bytes differ, in the order in which they were replayed.
         largest_difference: of any value of any two messages that differ; infinite when one cannot be decoded.
         excused: replayed messages without one that flew, for a known reason.
     """
@@ -26,13 +26,13 @@ class Comparison:
             flown: serialised messages by header stamp [ns].
             codec: of their type.
         """
-        self.compared = 0
         self.different: list[int] = []
         self.largest_difference = 0.0
         self.excused = 0
         self._codec = codec
         self._flown = dict(flown)
         self._replayed_alone: list[int] = []
+        self._compared_ns: list[int] = []
 
     def expected(self, stamp_ns: int) -> bytes | None:
         """What flew at a stamp and has not been compared yet."""
@@ -44,20 +44,27 @@ class Comparison:
         if flown is None:
             self._replayed_alone.append(stamp_ns)
             return False
-        self.compared += 1
+        self._compared_ns.append(stamp_ns)
         if flown == data:
             return True
         self.different.append(stamp_ns)
         self.largest_difference = max(self.largest_difference, self._difference(flown, data))
         return False
 
-    def excuse(self, after_ns: int, before_ns: int) -> int:
-        """Forgives messages of the replay alone with stamps between two; how many there were."""
-        kept = [stamp for stamp in self._replayed_alone if not after_ns < stamp < before_ns]
+    def excuse_before(self, stamp_ns: int) -> int:
+        """Forgives messages of the replay alone between a stamp and the last compared one before; how many."""
+        before = bisect_left(self._compared_ns, stamp_ns)
+        last_ns = self._compared_ns[before - 1] if before else 0
+        kept = [stamp for stamp in self._replayed_alone if not last_ns < stamp < stamp_ns]
         forgiven = len(self._replayed_alone) - len(kept)
         self._replayed_alone = kept
         self.excused += forgiven
         return forgiven
+
+    @property
+    def compared(self) -> int:
+        """Stamps that both sides have."""
+        return len(self._compared_ns)
 
     @property
     def unmatched(self) -> int:

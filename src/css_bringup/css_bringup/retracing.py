@@ -19,6 +19,10 @@ from css_common.stepping import Port, Stepper
 
 _WINDOW_NS = 20_000_000_000
 _WINDOW_STEPS = 100
+# A fresh state may take some steps to show.
+_RECENT = 50
+# Bytes that differ now and then, as by rounding, are not worth a search each.
+_MOST_FUTILE = 3
 
 Given = list[tuple[Port, Sample, bytes]]
 """Messages of one step."""
@@ -27,8 +31,8 @@ Given = list[tuple[Port, Sample, bytes]]
 class _Step(NamedTuple):
     stamp_ns: int
     received: Received
-    before: Any  # snapshot
-    given: list[bytes]
+    before: Any  # snapshot; None: not taken
+    given: list[bytes] | None  # what was given and agreed with the flight; None: nothing flew
 
 
 class Retrace:
@@ -61,7 +65,9 @@ class Retrace:
         self._changes = deque(changes)
         self._fresh = fresh
         self._history: list[_Step] = []
-        self._agreed_ns: int | None = None
+        self._recent: deque[_Step] = deque(maxlen=_RECENT)
+        self._agreed = False
+        self._futile = 0
         self._searched = False
         reach = max(_WINDOW_NS, _WINDOW_STEPS * stepper.component.period_ns)
         self._reach_ns = reach if comparison is not None else 0
@@ -76,12 +82,14 @@ class Retrace:
         if self._comparison is None:
             return given
         agrees = self._agrees(given)
+        step = _Step(stamp_ns, received, before, [data for *_, data in given] if agrees else None)
+        self._recent.append(step)
         if is_near:
-            self._history.append(_Step(stamp_ns, dict(received), before, [data for *_, data in given]))
+            self._history.append(step)
         if agrees is False:
-            given = self._explained(stamp_ns, received) or given
+            given = self._explained() or given
         elif agrees:
-            self._agreed_ns = stamp_ns
+            self._agreed = True
         return given
 
     def finish(self) -> None:
@@ -116,12 +124,12 @@ class Retrace:
                 self.unplaced.append(change)
                 self._searched = False
 
-    def _explained(self, stamp_ns: int, received: Received) -> Given | None:
+    def _explained(self) -> Given | None:
         found = None
         if self._history and not self._searched:
             found = self._with_changes()
             self._searched = found is None
-        return self._after_restart(stamp_ns, received) if found is None else found
+        return self._after_restart() if found is None else found
 
     def _with_changes(self) -> Given | None:
         """The last step's messages with the next changes made where all bytes agree; None: nowhere."""
@@ -130,21 +138,20 @@ class Retrace:
         for count in range(1, len(due) + 1):
             values = {name: value for change in due[:count] for name, value in change.values.items()}
             for first in reversed(range(len(steps))):
-                given = self._retried(steps[first:], values)
+                self.stepper.restore(steps[first].before)
+                given = self._rerun(steps[first:]) if self._set(values) else None
                 if given is not None:
-                    self._agreed_ns = steps[-1].stamp_ns
+                    self._agreed = True
                     self._accept(due[:count], steps[first].stamp_ns)
                     return given
         self.stepper.restore(latest)
         return None
 
-    def _retried(self, steps: list[_Step], values: Mapping[str, Any]) -> Given | None:
-        """The messages of the last of some steps with values set before the first; None when any byte differs."""
-        self.stepper.restore(steps[0].before)
-        if not self._set(values):
-            return None
+    def _rerun(self, steps: list[_Step]) -> Given | None:
+        """The messages of the last of some steps from the present state on; None when any byte is not as it flew."""
         for step in steps[:-1]:
-            if [data for *_, data in self._given(step.stamp_ns, step.received)] != step.given:
+            again = [data for *_, data in self._given(step.stamp_ns, step.received)]
+            if step.given is not None and again != step.given:
                 return None
         given = self._given(steps[-1].stamp_ns, steps[-1].received)
         return given if self._agrees(given) else None
@@ -164,23 +171,38 @@ class Retrace:
 
     # Fresh states
 
-    def _after_restart(self, stamp_ns: int, received: Received) -> Given | None:
-        """The messages of a fresh state, if they are those that flew; looked for where the flight agreed before."""
-        assert self._comparison is not None
-        if self._agreed_ns is None:
+    def _after_restart(self) -> Given | None:
+        """The messages of a state that began anew lately, if all since then are as they flew.
+
+        It is looked for where replay and flight agreed before.
+        """
+        if not self._agreed or self._futile >= _MOST_FUTILE:
             return None
-        agreed_ns, self._agreed_ns = self._agreed_ns, None
+        self._agreed = False
         latest = self.stepper.snapshot()
         self.stepper.component.configure()
-        for candidate in (self.stepper.snapshot(), self._fresh().snapshot()):
-            self.stepper.restore(candidate)
-            given = self._given(stamp_ns, received)
-            if self._agrees(given):
-                self._agreed_ns = stamp_ns
-                self._history.clear()
-                silent = self._comparison.excuse(agreed_ns, stamp_ns)
-                silence = f", after {silent} stamps without an estimate" if silent else ""
-                self.notes.append(f"the estimator began anew in flight at stamp {stamp_ns} ns{silence}")
-                return given
+        candidates = (self.stepper.snapshot(), self._fresh().snapshot())
+        steps = list(self._recent)
+        for first in reversed(range(len(steps))):
+            # it began with an answer that is known, or nothing tells that it began there
+            if steps[first].given is None and first < len(steps) - 1:
+                continue
+            for candidate in candidates:
+                self.stepper.restore(candidate)
+                given = self._rerun(steps[first:])
+                if given is not None:
+                    self._note_restart(steps, first)
+                    return given
         self.stepper.restore(latest)
+        self._futile += 1
         return None
+
+    def _note_restart(self, steps: list[_Step], first: int) -> None:
+        assert self._comparison is not None
+        self._agreed = True
+        self._futile = 0
+        self._history.clear()
+        self._recent.clear()
+        silent = self._comparison.excuse_before(steps[first].stamp_ns)
+        silence = f", after {silent} stamps without an estimate" if silent else ""
+        self.notes.append(f"the estimator began anew in flight at stamp {steps[first].stamp_ns} ns{silence}")
