@@ -101,7 +101,7 @@ class PlantNode(ComponentNode):
 
     def _activate(self) -> None:
         # no fresh state here: a plant that was deactivated has paused, and time goes on where it stood
-        self._is_active = True
+        self.stepper.is_active = True
         self._waiting_since = time.monotonic()
         if self._begun:
             self._go_on_timer.reset()
@@ -211,8 +211,7 @@ class PlantNode(ComponentNode):
         self._waiting_since = time.monotonic()
         self.counters["cycles"] += 1
         try:
-            if self._events:
-                self._apply_events(stamp_ns)
+            self.stepper.apply_due(stamp_ns)
             if self._clock_publisher is not None:
                 seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
                 self._clock_publisher.publish(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))

@@ -32,6 +32,9 @@ from css_msgs.msg import (
 from css_recording.errors import BagError
 from css_studies.message_columns import Columns, stack
 
+IMPORTED_FROM = "imported_from"
+"""Entry in the description of a recording that was made of a table of telemetry."""
+
 SUNLIT_FRACTION = 0.5
 """The flight is sunlit while more than this fraction of the solar disc is in view."""
 
@@ -84,6 +87,8 @@ class FlightLog:
         attitudes: name of the attitude filter to `AttitudeEstimate` columns.
         voltages, wheels, torque_command, control: columns of the topic, None when there is none.
         notes: what could not be read, one line each.
+        imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
+            arrays of its mission are defaults that nobody gave.
     """
 
     origin: str
@@ -96,6 +101,7 @@ class FlightLog:
     torque_command: Columns | None = None
     control: Columns | None = None
     notes: list[str] = field(default_factory=list)
+    imported: bool = False
 
     def columns(self) -> list[Columns]:
         """All columns of the log, none of them empty."""
@@ -234,6 +240,7 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
 
     with BagReader(path, remap) as reader:
         mission, notes = None, []
+        imported = IMPORTED_FROM in reader.description
         text = reader.mission_text
         if text is not None:
             try:
@@ -250,7 +257,7 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         append = {topic: received.append for topic, (_, received) in messages.items()}
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
-    log = FlightLog(str(path), mission, notes=notes)
+    log = FlightLog(str(path), mission, notes=notes, imported=imported)
     for topic, (message_type, received) in messages.items():
         try:
             log.add(topic, message_type, stack(codec_of(message_type), received).sorted())
