@@ -17,8 +17,9 @@ from css_common.codec import type_name
 from css_common.component import Component, Plant
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
-from css_common.mission import Mission, belongs_to_ros
+from css_common.mission import Mission
 from css_common.mission_file import MissionError, flattened, read_sections
+from css_common.parameter_sections import belongs_to_ros
 from css_common.plant_host import PlantNode
 from css_common.schema import ParameterError, default_values, unknown_name
 from css_common.sections import GRAPH
