@@ -96,6 +96,7 @@ class ComponentNode(LifecycleNode):
         self._output_ports: dict[str, tuple] = {}
         self._subscriptions_made: list = []
         self._events: list[Event] = []
+        self.refused = ""
         self._is_active = False
         self._seen_errors: set[str] = set()
         self._last_stamp = 0
@@ -144,7 +145,8 @@ class ComponentNode(LifecycleNode):
         try:
             transition()
         except ParameterError as error:
-            self.get_logger().error(str(error))
+            self.refused = str(error)
+            self.get_logger().error(self.refused)
             return _FAILURE
         except Exception:
             if self.context.ok():  # else a signal has ended ROS under it, and that is no news

@@ -34,6 +34,7 @@ from css_common.parameter_sections import (
 from css_common.schema import (
     Parameter,
     ParameterError,
+    Table,
     Values,
     checked_values,
     flag,
@@ -85,15 +86,26 @@ class Node:
 
 
 class Mission:
-    """A validated mission. Use `load_mission` or `default_mission`."""
+    """A validated mission. Use `load_mission` or `default_mission`.
 
-    def __init__(self, origin: str, parameters: dict[str, dict[str, Any]], namespace: str = "/") -> None:
+    Attributes:
+        remarks: what is right but may not be what was meant, one line each.
+    """
+
+    def __init__(
+        self,
+        origin: str,
+        parameters: dict[str, dict[str, Any]],
+        namespace: str = "/",
+        guest: tuple[str, type[Component]] | None = None,
+    ) -> None:
         """Validates all sections.
 
         Args:
             origin: file name for messages.
             parameters: section name to flat parameter names and raw values.
             namespace: of its nodes.
+            guest: name and component of a node beside the graph, which may have a section, too.
 
         Raises:
             MissionError: naming the file, section, key, value and what was expected.
@@ -108,11 +120,12 @@ class Mission:
             self.values = shaped_values(_SHARED_TABLE, self.shared)
             _refuse(sections.conflicts(self.values))
         self.nodes = self._build_nodes()
-        self._check_keys()
         tables = {node.name: node.component.table() for node in self.nodes}
+        self._check_keys(tables if guest is None else tables | {guest[0]: guest[1].table()})
         self.events = events_of(_below("events.", given), tables, f"{origin}: {SHARED}")
         self.criteria = criteria_of(_below("criteria.", given), f"{origin}: {SHARED}")
         self._check_wiring()
+        self.remarks = tuple(self._unmeant())
 
     @property
     def name(self) -> str:
@@ -133,17 +146,6 @@ class Mission:
     def steps(self) -> int:
         """Number of control cycles to fly."""
         return round(self.values.mission.duration / self.values.mission.period)
-
-    @property
-    def remarks(self) -> tuple[str, ...]:
-        """What is right but may not be what was meant, one line each."""
-        given, flown = self.values.mission.duration, self.steps * self.values.mission.period
-        if abs(given - flown) <= 1e-6 * self.values.mission.period:
-            return ()
-        return (
-            f"mission.duration: {given:.9g} s is no multiple of mission.period {self.values.mission.period:.9g} s: "
-            f"{self.steps} steps are flown, {flown:.9g} s",
-        )
 
     def node(self, name: str) -> Node:
         """The node called `name`.
@@ -255,18 +257,17 @@ class Mission:
             nodes.append(self._node(name, package, executable, find_component(package, executable, self.origin)))
         return tuple(nodes)
 
-    def _check_keys(self) -> None:
+    def _check_keys(self, tables: Mapping[str, Table]) -> None:
         """Refuses sections that are for no node of the graph, and keys that none of a section's nodes has."""
         for section, parameters in self.parameters.items():
-            nodes = [node for node in self.nodes if is_for(section, node.name, self.namespace)]
+            names = [name for name in tables if is_for(section, name, self.namespace)]
             shared = is_shared(section, self.namespace)
-            if not nodes and not shared:
-                names = [node.name for node in self.nodes]
+            if not names and not shared:
                 raise MissionError(
-                    f"{self.origin}: section {unknown_name(section, names)} (sections are {SHARED} and the nodes "
-                    f"of graph.nodes: {', '.join(names)})"
+                    f"{self.origin}: section {unknown_name(section, tables)} (sections are {SHARED} and the nodes "
+                    f"of graph.nodes: {', '.join(tables)})"
                 )
-            known = {p.name: p for node in nodes for p in node.component.table()} | _OF_ROS
+            known = {p.name: p for name in names for p in tables[name]} | _OF_ROS
             known |= _SHARED_NAMES if shared else {}
             for key, value in parameters.items():
                 if key.startswith("qos_overrides.") or (shared and key.startswith(_SCRIPTS)):
@@ -276,6 +277,14 @@ class Mission:
                         raise ParameterError(unknown_name(key, known))
                     if key in _OF_ROS:
                         _OF_ROS[key].check(value)
+
+    def _unmeant(self) -> Iterator[str]:
+        given, period = self.values.mission.duration, self.values.mission.period
+        if abs(given - self.steps * period) > 1e-6 * period:
+            yield (
+                f"mission.duration: {given:.9g} s is no multiple of mission.period {period:.9g} s: "
+                f"{self.steps} steps are flown, {self.steps * period:.9g} s"
+            )
 
     def _node(self, name: str, package: str, executable: str, component: type[Component]) -> Node:
         table = component.table()

@@ -95,7 +95,7 @@ def test_help_names_topics_and_parameters_and_starts_nothing(capsys):
 
 
 BAD = {
-    "value": (["-p", "gain:=11.0"], "estimator: gain: expected a number written with a point, at least 0"),
+    "value": (["-p", "gain:=11.0"], "estimator: gain: 11.0 given, expected at least 0 and at most 10"),
     "assignment": (["-p", "gain=3.0"], "estimator: "),
 }
 
