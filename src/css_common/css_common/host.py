@@ -30,6 +30,7 @@ from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import Edge, Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
+from css_common.rcl_errors import endpoint
 from css_common.schema import ParameterError, Values, shaped_values
 
 _SUCCESS = TransitionCallbackReturn.SUCCESS
@@ -175,9 +176,7 @@ class ComponentNode(LifecycleNode):
         return ros_parameters.declare(self, self._table, node.canonical)
 
     def _configure(self) -> None:
-        reason = self._conflict(self._canonical)
-        if reason:
-            raise ParameterError(reason)
+        self.check()
         name = self.get_name()
         self.component = self.component_type(name, shaped_values(self._table, self._canonical))
         self.component.report = self.get_logger().info
@@ -189,13 +188,25 @@ class ComponentNode(LifecycleNode):
         self.matcher = Matcher(self.component, inputs, awaited)
         self._events = [e for e in self.mission.events if e.node == name]
         for output in self.component_type.outputs(name, values):
-            self._output_ports[output.key] = self._create_output(output)
+            with endpoint(output.topic):
+                self._output_ports[output.key] = self._create_output(output)
         for source in inputs:
             edge = Edge(source, values, self.get_logger().warning)
             self.edges[source.key] = edge
-            self._subscribe(source.message_type, source.topic, partial(self._receive, source.key, edge))
+            with endpoint(source.topic):
+                self._subscribe(source.message_type, source.topic, partial(self._receive, source.key, edge))
         if self.mission.values.lockstep.realtime_factor > 0.0 and any(not i.required for i in inputs):
             self._deadline_timer = self.create_timer(values.io.deadline, self._run_overdue, clock=self._steady)
+
+    def check(self) -> None:
+        """Looks whether the parameters fit together.
+
+        Raises:
+            ParameterError: they do not.
+        """
+        reason = self._conflict(self._canonical)
+        if reason:
+            raise ParameterError(reason)
 
     def _create_output(self, output: Output) -> tuple:
         publisher = self.create_publisher(

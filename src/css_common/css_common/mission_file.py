@@ -79,8 +79,6 @@ def _sections(bodies: Mapping[str, Any], space: str, place: str) -> Iterator[tup
     for key, body in bodies.items():
         name = f"{space}/{key}" if space else key
         here = place if space else f"{place}: {key}"
-        if body is None and not space:
-            continue
         if not isinstance(body, Mapping) or (_PARAMETERS in body and len(body) > 1):
             raise MissionError(f"{here}: expected the one key {_PARAMETERS} below it")
         if _PARAMETERS not in body:
@@ -88,7 +86,7 @@ def _sections(bodies: Mapping[str, Any], space: str, place: str) -> Iterator[tup
             continue
         if not _SECTION.fullmatch(name):
             raise MissionError(f"{here}: expected the name of a node, {name!r} is none")
-        parameters = {} if body[_PARAMETERS] is None else body[_PARAMETERS]
+        parameters = body[_PARAMETERS]
         if not isinstance(parameters, Mapping):
             raise MissionError(f"{here}: {_PARAMETERS} must hold keys and values")
         yield name, parameters

@@ -20,10 +20,13 @@ from css_common.parameter_sections import (
     merged_files,
     shared_by_all,
 )
-from css_common.schema import ParameterError, default_values, nearest, unknown_name
+from css_common.schema import ParameterError, default_values, nearest, shown, unknown_name
 from css_common.sections import GRAPH, SECTIONS
 
 _NAMING = re.compile(r"(?:(\w+):)?__(node|name|ns):=(.*)", re.DOTALL)
+_NODE = re.compile(r"[A-Za-z]\w*", re.ASCII)
+_NAMESPACE = re.compile(r"/|(/[A-Za-z_]\w*)+", re.ASCII)
+_LONGEST_NAME = 100
 _SHARED_NAMES = frozenset(p.name for table in SECTIONS.values() for p in table)
 
 
@@ -50,17 +53,22 @@ def parse_arguments(executable: str, arguments: Iterable[str]) -> NodeArguments:
     """Takes a command line apart as rcl does; what rcl refuses is left to rcl."""
     of_ros, others = _split(arguments)
     result = NodeArguments(executable, others=others)
-    renamed: dict[str, str] = {}
+    rules: list[re.Match[str]] = []
     for option, value in pairwise(of_ros):
         if option == "--params-file":
             result.files.append(value)
         elif option in ("-p", "--param"):
             result.overrides.append(value)
-        elif option in ("-r", "--remap") and (rule := _NAMING.fullmatch(value)) and rule[1] in (None, executable):
-            renamed.setdefault("ns" if rule[2] == "ns" else "name", rule[3])  # the first rule counts
-    result.name = renamed.get("name", executable)
-    result.namespace = renamed.get("ns", "/")
+        elif option in ("-r", "--remap") and (rule := _NAMING.fullmatch(value)):
+            rules.append(rule)
+    result.name = _renamed(rules, ("node", "name"), executable, executable)
+    result.namespace = _renamed(rules, ("ns",), result.name, "/")
     return result
+
+
+def _renamed(rules: list[re.Match[str]], kinds: tuple[str, ...], name: str, otherwise: str) -> str:
+    """What the first rule says that is for the node of that name."""
+    return next((rule[3] for rule in rules if rule[2] in kinds and rule[1] in (None, name)), otherwise)
 
 
 def _split(arguments: Iterable[str]) -> tuple[list[str], list[str]]:
@@ -88,6 +96,7 @@ def mission_of_arguments(component_type: type[Component], arguments: Iterable[st
     """
     executable = component_type.__module__.rpartition(".")[2]
     given = parse_arguments(executable, arguments)
+    _refuse_bad_names(given)
     _refuse_unknown_overrides(component_type, given)
     files = [(file, _sections_of(file)) for file in given.files]
     sections = merged_files(read for _, read in files)
@@ -105,11 +114,23 @@ def _sections_of(file: str) -> dict[str, dict[str, Any]]:
     return {section: flattened(body) for section, body in read_sections(read_text(file), file).items()}
 
 
+def _refuse_bad_names(given: NodeArguments) -> None:
+    for rule, text, form in (("__node", given.name, _NODE), ("__ns", given.namespace, _NAMESPACE)):
+        if not form.fullmatch(text) or len(text) > _LONGEST_NAME:
+            raise ParameterError(
+                f"-r {rule}:={shown(text)}: expected at most {_LONGEST_NAME} letters, digits and _, no digit first"
+                + (", after a /" if rule == "__ns" else "")
+            )
+
+
 def _refuse_unknown_overrides(component_type: type[Component], given: NodeArguments) -> None:
     # ROS keeps an override that nobody declares without a word
     known = [p.name for p in component_type.table()]
     for override in given.overrides:
-        node, _, key = override.partition(":=")[0].rpartition(":")
+        assigned, separator, _ = override.partition(":=")
+        node, _, key = assigned.rpartition(":")
+        if not separator:
+            raise ParameterError(f"-p {override}: expected KEY:=VALUE")
         if node in ("", given.name) and key not in known and not belongs_to_ros(key):
             raise ParameterError(unknown_name(key, known))
 

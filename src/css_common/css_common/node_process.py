@@ -83,18 +83,18 @@ class _Process:
     def run(self, arguments: list[str]) -> int:
         """Starts the node and lets it work; the exit code."""
         try:
-            self._node = self._create(arguments)
+            node = self._create(arguments)
         except (MissionError, ParameterError) as error:
             return self._refuse(str(error))
         except REFUSALS as error:
             return self._refuse(explained(error))
-        if not self._node.start():
-            return USAGE_ERROR if self._node.refused else FAILED
-        for remark in _unused_overrides(self._node):
-            self._node.get_logger().warning(remark)
+        if not node.start():
+            return USAGE_ERROR if node.refused else FAILED
+        for remark in _unused_overrides(node):
+            node.get_logger().warning(remark)
         self.stop.raises = False
         assert self._executor is not None
-        return self._spin(self._executor, self._node)
+        return self._spin(self._executor, node)
 
     def _create(self, arguments: list[str]) -> ComponentNode:
         others = parse_arguments(self._executable, arguments).others
@@ -113,6 +113,8 @@ class _Process:
             raise ParameterError(str(error)) from error
         node = create_node(self._component_type, self._executable, mission)
         self._executor.add_node(node)
+        self._node = node  # from here on it is given up at the end, whatever comes
+        node.check()
         for remark in mission.remarks:
             node.get_logger().warning(remark)
         return node

@@ -18,6 +18,7 @@ from css_common.codec import DecodeError, Sample, stamp_of
 from css_common.component import Outgoing, Plant
 from css_common.edge import Edge
 from css_common.host import ComponentNode
+from css_common.rcl_errors import endpoint
 
 
 class PlantNode(ComponentNode):
@@ -73,7 +74,8 @@ class PlantNode(ComponentNode):
         self._divided = any(self.mission.outputs[topic].divider > 1 for topic in awaited)
         for topic in awaited:
             if topic not in consumed:
-                self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
+                with endpoint(topic):
+                    self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
         if lockstep.publish_clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
         self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)

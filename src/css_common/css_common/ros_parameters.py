@@ -3,6 +3,7 @@
 
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -10,7 +11,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from css_common.schema import Parameter, ParameterError
+from css_common.schema import Parameter, ParameterError, integer
 
 _TYPES = {
     "real": RosParameter.Type.DOUBLE,
@@ -22,6 +23,8 @@ _TYPES = {
     "integers": RosParameter.Type.INTEGER_ARRAY,
     "texts": RosParameter.Type.STRING_ARRAY,
 }
+
+_DEPTH = integer("depth", 10, "-", "messages that are kept", low=1, high=1_000_000)  # what rcl makes of others is long
 
 
 def _descriptor(p: Parameter) -> ParameterDescriptor:
@@ -69,6 +72,9 @@ def declare(node: Node, table: Iterable[Parameter], canonical: Mapping[str, Any]
             p.check(_plain(p, node._parameter_overrides[p.name].value))  # says it in the words of a mission
             raise ParameterError(f"{p.name}: expected {p.expectation()} ({error})") from error
         result[p.name] = p.check(_plain(p, node.get_parameter(p.name).value))
+    for name, given in node._parameter_overrides.items():
+        if name.startswith("qos_overrides.") and name.endswith(".depth"):
+            replace(_DEPTH, name=name).check(given.value)
     return result
 
 

@@ -43,6 +43,8 @@ NOT_A_PARAMETER_FILE = {
     "[1, 2]": "expected node names at the top, found list",
     "just words": "expected node names at the top, found str",
     "/**: {mission: {name: x}}": "/**: expected the one key ros__parameters below it",
+    "/**:": "/**: expected the one key ros__parameters below it",
+    "/**: {ros__parameters: }": "/**: ros__parameters must hold keys and values",
     "/**: 3": "/**: expected the one key ros__parameters below it",
     "/**/mission:\n  name: x": "/**/mission: expected the one key ros__parameters below it",
     "a: {b-c: {ros__parameters: {}}}": "a: expected the name of a node, 'a/b-c' is none",
