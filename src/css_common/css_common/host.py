@@ -99,6 +99,8 @@ class ComponentNode(LifecycleNode):
         self._events: list[Event] = []
         self.refused = ""
         self._is_active = False
+        self._unanswered: tuple[int, dict[str, Sample | None]] | None = None
+        self._forgiven: Counter[str] = Counter()  # failures before the last start, which are none of this one's
         self._seen_errors: set[str] = set()
         self._last_stamp = 0
         self._began: tuple[float, float] | None = None
@@ -148,6 +150,7 @@ class ComponentNode(LifecycleNode):
         except ParameterError as error:
             self.refused = str(error)
             self.get_logger().error(self.refused)
+            self._clean_up()  # a transition that is refused leads to no error state, which would do that
             return _FAILURE
         except Exception:
             if self.context.ok():  # else a signal has ended ROS under it, and that is no news
@@ -235,6 +238,9 @@ class ComponentNode(LifecycleNode):
             self.counters["reactivated"] += 1
             self.component.configure()
         self._is_active = True
+        unanswered, self._unanswered = self._unanswered, None
+        if unanswered is not None:
+            self._run(*unanswered)
 
     def _deactivate(self) -> None:
         self._is_active = False
@@ -253,6 +259,9 @@ class ComponentNode(LifecycleNode):
         self._output_ports.clear()
         self.edges.clear()
         self.component = self.matcher = None  # type: ignore[assignment]
+        self._overdue_stamp = self._unanswered = None
+        self._forgiven = Counter(self.counters)
+        self._seen_errors.clear()
 
     def destroy_node(self) -> None:
         """Destroys the node now; rclpy alone would leave it, and its name, to the garbage collector."""
@@ -288,6 +297,8 @@ class ComponentNode(LifecycleNode):
     # Messages
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        if self.edges.get(key) is not edge:  # was under way when the node was cleaned up
+            return
         sample = edge.accept(data)
         if sample is None:
             return
@@ -300,6 +311,8 @@ class ComponentNode(LifecycleNode):
             self._run(stamp_ns, received)
 
     def _run_overdue(self) -> None:
+        if self.matcher is None:  # a firing that was under way when the node was cleaned up
+            return
         # Two firings apart: what was pending at the last one and still is has waited a whole deadline.
         waiting = self.matcher.oldest_pending()
         if waiting is not None and waiting == self._overdue_stamp:
@@ -317,11 +330,20 @@ class ComponentNode(LifecycleNode):
         try:
             if self._events:
                 self._apply_events(stamp_ns)
-            self._publish((component.cycle if self._is_active else component.idle)(stamp_ns, received))
+            if self._is_active:
+                outgoing = component.cycle(stamp_ns, received)
+            else:
+                outgoing = component.idle(stamp_ns, received)
+                self._unanswered = None if outgoing or not self._awaited_in_lockstep() else (stamp_ns, received)
+            self._publish(outgoing)
         except Exception as error:
             self._report_failure(error)
         else:
             self.counters["cycles"] += 1
+
+    def _awaited_in_lockstep(self) -> bool:
+        """Whether simulated time may stand still for this node: what it leaves out it then has to make up for."""
+        return self.mission.plant is not None and self.mission.values.lockstep.realtime_factor == 0.0
 
     def _publish(self, outgoing: Outgoing) -> None:
         for key, sample in messages_of(outgoing):
@@ -356,6 +378,7 @@ class ComponentNode(LifecycleNode):
             elif event.action == "deactivate" and self._is_active:
                 self.trigger_deactivate()
             elif event.action == "activate" and not self._is_active:
+                self._unanswered = None  # the step of the event follows
                 self.trigger_activate()
 
     # Parameters
@@ -390,7 +413,7 @@ class ComponentNode(LifecycleNode):
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
-        if self.counters["cycle_failed"] or self.counters["withheld_not_finite"]:
+        if any(self.counters[kind] > self._forgiven[kind] for kind in ("cycle_failed", "withheld_not_finite")):
             return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
         if any(edge.rejected for edge in self.edges.values()):
             return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)

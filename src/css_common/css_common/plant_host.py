@@ -75,7 +75,7 @@ class PlantNode(ComponentNode):
         for topic in awaited:
             if topic not in consumed:
                 with endpoint(topic):
-                    self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
+                    self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic, self.component))
         if lockstep.publish_clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
         self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)
@@ -201,6 +201,8 @@ class PlantNode(ComponentNode):
             self._go_on_timer.reset()
 
     def _go_on(self) -> None:
+        if self._go_on_timer is None:  # a firing that was under way when the node was cleaned up
+            return
         self._go_on_timer.cancel()
         self._advance_if_answered()
 
@@ -210,6 +212,8 @@ class PlantNode(ComponentNode):
         self.done = True
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        if self.edges.get(key) is not edge:  # was under way when the node was cleaned up
+            return
         if edge.source.topic in self._lost:
             # it is back: whatever it says next counts, and the loop waits for it again
             edge.guard.last = None
@@ -217,7 +221,9 @@ class PlantNode(ComponentNode):
         if sample is not None:
             self._take(key, edge.source.topic, sample.stamp_ns, sample)
 
-    def _note(self, topic: str, data: bytes) -> None:
+    def _note(self, topic: str, component: Plant, data: bytes) -> None:
+        if component is not self.component:  # was under way when the node was cleaned up
+            return
         try:
             stamp_ns = stamp_of(data)
         except DecodeError:
