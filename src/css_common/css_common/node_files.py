@@ -8,7 +8,7 @@ from pathlib import Path
 
 from css_common.component import Component
 from css_common.mission_file import MissionError
-from css_common.schema import shown
+from css_common.schema import nearest, shown
 
 _KEY = "/**: graph.nodes"
 _LONGEST_NAME = 100  # [characters] it becomes part of topic names, which ROS limits, and of file names
@@ -36,10 +36,12 @@ def find_component(package: str, executable: str, origin: str = "mission") -> ty
         MissionError: there is no such node file, or it defines no component.
     """
     module_name = f"{package}.nodes.{executable}"
-    if not _is_node_file(package, executable):
+    files = _node_files(package)
+    if executable not in files:
+        near = nearest(executable, files)
         raise MissionError(
-            f"{origin}: {_KEY}: {package}/{executable}: "
-            f"there is no {module_name.replace('.', '/')}.py in this workspace"
+            f"{origin}: {_KEY}: {package}/{executable}: there is no {module_name.replace('.', '/')}.py "
+            "in this workspace" + (f"; did you mean {package}/{near}?" if near else "")
         )
     module = importlib.import_module(module_name)
     for item in vars(module).values():
@@ -48,11 +50,11 @@ def find_component(package: str, executable: str, origin: str = "mission") -> ty
     raise MissionError(f"{origin}: {_KEY}: {module_name} defines no component")
 
 
-def _is_node_file(package: str, executable: str) -> bool:
-    """Whether there is PACKAGE/nodes/EXECUTABLE.py; asked of the disk, for an import would run what it finds."""
+def _node_files(package: str) -> list[str]:
+    """Names of PACKAGE/nodes/*.py; asked of the disk, for an import would run what it finds."""
     try:
         spec = importlib.util.find_spec(package)
     except ValueError:  # `__main__` and its like have no place
-        return False
+        return []
     places = (spec.submodule_search_locations if spec is not None else None) or ()
-    return any((Path(place) / "nodes" / f"{executable}.py").is_file() for place in places)
+    return [file.stem for place in places for file in sorted((Path(place) / "nodes").glob("*.py"))]
