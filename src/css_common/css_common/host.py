@@ -6,6 +6,7 @@ component; what only the node that owns simulated time does is in `css_common.pl
 """
 
 import contextlib
+import copy
 import time
 import traceback
 from collections import Counter
@@ -32,6 +33,7 @@ from css_common.edge import Edge
 from css_common.matching import Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
+from css_common.rcl_errors import endpoint
 from css_common.schema import ParameterError, Values
 from css_common.sole_subscription import SoleSubscription
 from css_common.stepping import Stepper, conflict
@@ -106,6 +108,9 @@ class ComponentNode(LifecycleNode):
         self._canonical = self._declare()
         self._output_ports: dict[str, tuple] = {}
         self.subscriptions_made: list[SoleSubscription] = []
+        self.refused = ""
+        self._unanswered: tuple[int, dict[str, Sample | None]] | None = None
+        self._forgiven: Counter[str] = Counter()  # failures before the last start, which are none of this one's
         self._seen_errors: set[str] = set()
         self._performing = False
         self._waiting_stamp: int | None = None
@@ -160,7 +165,9 @@ class ComponentNode(LifecycleNode):
         try:
             transition()
         except ParameterError as error:
-            self.get_logger().error(str(error))
+            self.refused = str(error)
+            self.get_logger().error(self.refused)
+            self._clean_up()  # a transition that is refused leads to no error state, which would do that
             return _FAILURE
         except Exception:
             if self.context.ok():  # else a signal has ended ROS under it, and that is no news
@@ -189,9 +196,7 @@ class ComponentNode(LifecycleNode):
         return ros_parameters.declare(self, self._table, node.canonical)
 
     def _configure(self) -> None:
-        reason = self._conflict(self._canonical)
-        if reason:
-            raise ParameterError(reason)
+        self.check()
         name = self.get_name()
         self.stepper = self._stepper(name)
         self.component = self.stepper.component
@@ -204,20 +209,32 @@ class ComponentNode(LifecycleNode):
         self.matcher = Matcher(self.component, inputs, awaited)
         self.stepper.tuned = self.matcher.retune
         for output in self.component_type.outputs(name, values):
-            self._output_ports[output.key] = self._create_output(output)
+            with endpoint(output.topic):
+                self._output_ports[output.key] = self._create_output(output)
         for source in inputs:
             edge = Edge(source, values, self.get_logger().warning)
             self.edges[source.key] = edge
             receive = partial(self._receive, source.key, edge)
-            self._subscribe(source.message_type, source.topic, receive, edge.begin_again)
+            with endpoint(source.topic):
+                self._subscribe(source.message_type, source.topic, receive, edge.begin_again)
         if self.mission.values.lockstep.realtime_factor > 0.0 and any(not i.required for i in inputs):
             self._deadline_timer = self.create_timer(values.io.deadline, self._run_overdue, clock=self._steady)
+
+    def check(self) -> None:
+        """Looks whether the parameters fit together.
+
+        Raises:
+            ParameterError: they do not.
+        """
+        reason = self._conflict(self._canonical)
+        if reason:
+            raise ParameterError(reason)
 
     def _create_output(self, output: Output) -> tuple:
         publisher = self.create_publisher(
             output.message_type,
             output.topic,
-            LOOP_PUBLISHER,
+            copy.copy(LOOP_PUBLISHER),  # rclpy writes overrides into the profile that it is given
             qos_overriding_options=_OVERRIDES,
         )
         return publisher, output.topic
@@ -241,6 +258,9 @@ class ComponentNode(LifecycleNode):
     def _activate(self) -> None:
         if self.stepper.activate():
             self.counters["reactivated"] += 1
+        unanswered, self._unanswered = self._unanswered, None
+        if unanswered is not None:
+            self._run(*unanswered)
 
     def _deactivate(self) -> None:
         self.stepper.deactivate()
@@ -256,6 +276,9 @@ class ComponentNode(LifecycleNode):
         self._output_ports.clear()
         self.edges.clear()
         self.component = self.stepper = self.matcher = None  # type: ignore[assignment]
+        self._overdue_stamp = self._unanswered = None
+        self._forgiven = Counter(self.counters)
+        self._seen_errors.clear()
 
     def stop_listening(self) -> None:
         """Ends all subscriptions; to be called while the executor still has the node."""
@@ -297,6 +320,8 @@ class ComponentNode(LifecycleNode):
     # Messages
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        if self.edges.get(key) is not edge:  # was under way when the node was cleaned up
+            return
         sample = edge.accept(data)
         if sample is None:
             return
@@ -309,6 +334,8 @@ class ComponentNode(LifecycleNode):
             self._run(stamp_ns, received)
 
     def _run_overdue(self) -> None:
+        if self.matcher is None:  # a firing that was under way when the node was cleaned up
+            return
         # Two firings apart: what was pending at the last one and still is has waited a whole deadline.
         waiting = self.matcher.oldest_pending()
         if waiting is not None and waiting == self._overdue_stamp:
@@ -323,11 +350,18 @@ class ComponentNode(LifecycleNode):
             self._mark_begin()
         # An exception that leaves a callback ends the process, so whatever a component does wrong ends here.
         try:
-            self._publish(self.stepper.step(stamp_ns, received))
+            outgoing = self.stepper.step(stamp_ns, received)
+            if not self._is_active:
+                self._unanswered = None if outgoing or not self._awaited_in_lockstep() else (stamp_ns, received)
+            self._publish(outgoing)
         except Exception as error:
             self._report_failure(error)
         else:
             self.counters["cycles"] += 1
+
+    def _awaited_in_lockstep(self) -> bool:
+        """Whether simulated time may stand still for this node: what it leaves out it then has to make up for."""
+        return self.mission.plant is not None and self.mission.values.lockstep.realtime_factor == 0.0
 
     def _publish(self, outgoing: Outgoing) -> None:
         for port, sample in self.stepper.checked(outgoing):
@@ -374,6 +408,7 @@ class ComponentNode(LifecycleNode):
         elif event.action == "deactivate" and self._is_active:
             self.trigger_deactivate()
         elif event.action == "activate" and not self._is_active:
+            self._unanswered = None  # the step of the event follows
             self.trigger_activate()
 
     # Parameters
@@ -409,7 +444,7 @@ class ComponentNode(LifecycleNode):
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
-        if self.counters["cycle_failed"] or self.counters["withheld_not_finite"]:
+        if any(self.counters[kind] > self._forgiven[kind] for kind in ("cycle_failed", "withheld_not_finite")):
             return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
         if any(edge.rejected for edge in self.edges.values()):
             return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)

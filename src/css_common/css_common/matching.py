@@ -7,7 +7,7 @@ from typing import NamedTuple
 from css_common.codec import Sample
 from css_common.component import Component, Input
 
-_MOST_PENDING = 64
+_MOST_PENDING = 2 * HISTORY  # more than the lead of the fastest topic over a node that was restarted
 _NEVER = -(2**63)
 
 

@@ -50,6 +50,30 @@ class Stretch(NamedTuple):
     cases: Cases
 
 
+_FLOWN = {
+    Dynamics: "css_sim/dynamics",
+    CssArray: "css_sim/css_array",
+    MrpControl: "sunpoint_control/mrp_control",
+}
+
+
+def refuse_uncovered(mission: Mission) -> None:
+    """Looks whether the compiled loop has a place for a mission, before anything of it is changed.
+
+    Raises:
+        MissionError: it has none.
+    """
+    kinds = [node.component for node in mission.nodes]
+    estimators = [node.name for node in mission.nodes if issubclass(node.component, SunEstimator)]
+    missing = [name for kind, name in _FLOWN.items() if kind not in kinds]
+    if missing or not estimators:
+        lacks = ", ".join([*missing, *([] if estimators else ["a Sun estimator"])])
+        raise MissionError(
+            f"{mission.origin}: the Monte Carlo does not cover this mission: graph.nodes has no {lacks}; "
+            "fly it on the graph"
+        )
+
+
 class MissionFlight:
     """The flights of a mission, all cases of one configuration.
 
