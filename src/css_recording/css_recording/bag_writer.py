@@ -32,7 +32,7 @@ from css_recording.schemas import MessageSchema, schema_of
 from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
 
 METADATA_RECORD = "sunpoint"
-_ROS_DISTRO = "jazzy"  # where no ROS is sourced
+ROS_DISTRO = "jazzy"  # where no ROS is sourced
 
 
 class BagWriter:
@@ -168,7 +168,11 @@ class BagWriter:
         if not self._open:
             return
         self.flush()
-        distro = os.environ.get("ROS_DISTRO", _ROS_DISTRO)
+        self._finish()
+
+    def _finish(self) -> None:
+        """Write what stands at the end of a recording."""
+        distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
         summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         with self._disk():

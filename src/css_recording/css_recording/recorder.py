@@ -24,12 +24,13 @@ from css_common.diagnostics import Diagnostics, Health
 from css_common.mission import Mission
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
 from css_recording.bag_metadata import Topic, absolute
-from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.flight_recorder import FlightRecorder
 from css_recording.provenance import software_versions
+from css_recording.recording_choice import RecordingChoice
 from css_recording.ros_topics import matching_qos, message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
+from css_recording.split_bag_writer import SplitBagWriter
 
 PARAMETER_EVENTS = "/parameter_events"
 _LOOK_EVERY = 0.02
@@ -54,6 +55,7 @@ class RecorderNode(Node):
         *,
         everything: bool = False,
         overwrite: bool = False,
+        choice: RecordingChoice | None = None,
         context: Context | None = None,
         use_global_arguments: bool = True,
     ) -> None:
@@ -65,6 +67,7 @@ class RecorderNode(Node):
             topics: further topics by name.
             everything: also every topic that appears.
             overwrite: replace a recording that is there.
+            choice: what is left out, quality of service, files; default: nothing, the strictest, one.
             context: ROS context.
             use_global_arguments: False in a composed process, where one command line serves many nodes.
 
@@ -74,6 +77,7 @@ class RecorderNode(Node):
         super().__init__("recorder", context=context, use_global_arguments=use_global_arguments)
         self.failure = ""
         self._everything = everything
+        self._choice = choice or RecordingChoice()
         self._expected: dict[str, type | None] = {}
         self._last: set[str] = set()
         self._discovered: set[str] = set()
@@ -97,6 +101,11 @@ class RecorderNode(Node):
     def ready(self) -> bool:
         """Every expected topic is subscribed and has a publisher."""
         return not self._missing(self._expected)
+
+    @property
+    def never_appeared(self) -> list[str]:
+        """Expected topics that nobody has published, or that cannot be recorded."""
+        return sorted(topic for topic in self._expected if topic not in self._subscribed)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -140,14 +149,19 @@ class RecorderNode(Node):
             limits = BufferLimits(hold_back_ns=max(SECOND_NS // 5, 2 * mission.period_ns))
             for name, output in mission.outputs.items():
                 topic = self.resolve_topic_name(name)
+                if topic in self._choice.excluded:
+                    continue
                 self._expected[topic] = output.message_type
                 spacing_ns[topic] = output.divider * mission.period_ns
                 recorded.append(Topic(topic, type_name(output.message_type), (recorded_qos(LOOP_PUBLISHER),)))
             if mission.plant is not None:
-                self._last = {self.resolve_topic_name(output.topic) for output in mission.plant.outputs}
+                plant = (self.resolve_topic_name(output.topic) for output in mission.plant.outputs)
+                self._last = {topic for topic in plant if topic in self._expected}
         events = (recorded_qos(qos_profile_parameter_events),)
         recorded.append(Topic(PARAMETER_EVENTS, type_name(ParameterEvent), events))
-        return FlightRecorder(BagWriter(bag, recorded, metadata, overwrite=overwrite, limits=limits), spacing_ns)
+        files = self._choice.limits
+        writer = SplitBagWriter(bag, recorded, metadata, files=files, overwrite=overwrite, limits=limits)
+        return FlightRecorder(writer, spacing_ns)
 
     def _watch_parameters(self) -> None:
         self.create_subscription(
@@ -182,7 +196,7 @@ class RecorderNode(Node):
 
     def _discover(self) -> None:
         for topic, types in self.get_topic_names_and_types():
-            known = topic in self._expected or topic in _LEFT_OUT
+            known = topic in self._expected or topic in _LEFT_OUT or topic in self._choice.excluded
             if not known and "/_" not in topic and len(types) == 1:
                 self._discovered.add(topic)
 
@@ -215,7 +229,7 @@ class RecorderNode(Node):
                 message_type,
                 topic,
                 partial(self._take, topic),
-                matching_qos(publishers, RECORDER_SUBSCRIPTION.depth),
+                self._choice.qos.get(topic) or matching_qos(publishers, RECORDER_SUBSCRIPTION.depth),
                 raw=True,
             )
 
