@@ -72,6 +72,6 @@ def test_one_line_and_code_2_for_what_is_wrong(what, tmp_path, capsys):
     out = [] if what == "folder" else ["--out", str(folder)]
     assert main([*mission, *out, *arguments]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("monte-carlo: ") and reason in err
+    assert err.startswith("monte_carlo: error: ") and reason in err
     assert err.count("\n") == 1
     assert not folder.exists(), "nothing is left that looks like a study"

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from spinning import STEADY, motion_of, pulses_of, sun_over_andoya
 
-from css_studies.commands.slit_analyse import FAILED, USAGE, main
+from css_common.command import FAILED, USAGE
+from css_studies.commands.slit_analyse import main
 from css_studies.slit_file import SlitFileError, read_slit_file
 
 NAMES = ("upper", "vertical", "lower")
@@ -79,7 +80,7 @@ def test_a_broken_file_is_named_with_its_line(text, message, tmp_path, capsys):
     path.write_text(text, encoding="utf-8")
     code, out, err = run(capsys, path)
     assert (code, out) == (USAGE, "")
-    assert err.startswith(f"slit_analyse: {path}: ")
+    assert err.startswith(f"slit_analyse: error: {path}: ")
     assert message in err
     assert len(err.splitlines()) == 1
 

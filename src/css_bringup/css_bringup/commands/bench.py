@@ -22,8 +22,9 @@ from css_bringup import monte_carlo_bench
 from css_bringup.flight import FlightResult
 from css_bringup.flying import fly
 from css_bringup.json_process import MeasurementError
-from css_bringup.options import FAILED, complain, console, guarded, whole_number
+from css_bringup.options import complain, console, guarded, whole_number
 from css_bringup.report import print_json
+from css_common.command import FAILED, CommandParser, command_parser
 from css_common.mission import Mission, load_mission
 
 _CONFIGURATIONS = {
@@ -33,11 +34,12 @@ _CONFIGURATIONS = {
     "processes_recorded": (True, True),
 }
 
+_EXAMPLES = ("graph", "graph --duration 60 --repeats 1 --json", "monte-carlo --cases 100")
+_EXITS = {1: "a flight failed, or one side cannot be measured"}
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "bench", __doc__, _EXAMPLES, _EXITS)
     subjects = parser.add_subparsers(dest="subject", required=True, metavar="{graph,monte-carlo}")
     graph = subjects.add_parser("graph", help="the graph of nodes in lockstep")
     graph.add_argument("--mission", default="okeefe_2013", help="mission to fly (default: %(default)s)")
@@ -56,16 +58,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: arguments.run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: arguments.run(arguments), (MeasurementError,))
 
 
 def _bench_monte_carlo(arguments: argparse.Namespace) -> int:
-    try:
-        monte_carlo_bench.run(arguments)
-    except MeasurementError as error:
-        complain("error:", error)
-        return FAILED
+    monte_carlo_bench.run(arguments)
     return 0
 
 

@@ -15,8 +15,6 @@ from css_bringup.figures import print_figures
 from css_bringup.flight import default_bag
 from css_bringup.flying import fly
 from css_bringup.options import (
-    FAILED,
-    INTERRUPTED,
     add_mission_options,
     add_output_options,
     complain,
@@ -28,16 +26,17 @@ from css_bringup.options import (
 from css_bringup.replay import parse_request
 from css_bringup.replaying import replay
 from css_bringup.report import flight_object, print_json, print_result, unmet
+from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
 
+_EXAMPLES = ("", "okeefe_2013 --duration 600 --out bags/first", "okeefe_2013 --case 7 --figures figures")
+_EXITS = {0: "flown, and all pass criteria of the mission met", 1: "the flight failed or missed a criterion"}
 _REPLAYED = ("ekf", "ekf:gyro=off", "wavg", "wavg:gyro=off")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "demo", __doc__, _EXAMPLES, _EXITS)
     add_mission_options(parser)
     add_output_options(parser)
     parser.add_argument("--figures", type=Path, metavar="DIR", help="where figures go (default: beside the recording)")
@@ -46,8 +45,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: _run(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:

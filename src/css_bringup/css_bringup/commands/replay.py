@@ -11,18 +11,24 @@ import sys
 from pathlib import Path
 
 from css_bringup.figures import print_figures
-from css_bringup.options import FAILED, complain, console, guarded
+from css_bringup.options import complain, console, guarded
 from css_bringup.replay import parse_request
 from css_bringup.replaying import ReplayResult, mission_of_bag, replay
 from css_bringup.report import print_json
+from css_common.command import FAILED, CommandParser, command_parser
 from css_common.mission_file import MissionError
 from css_studies.flight_summary import summary_table
 
+_EXAMPLES = (
+    "bags/FLIGHT",
+    "bags/FLIGHT --estimators wavg:gate=0.3 ekf:gyro=off --figures figures",
+    "bags/FOREIGN --mission okeefe_2013 --remap /sensors/css:=/css/voltages",
+)
+_EXITS = {0: "every estimator that was asked for gave estimates", 1: "one gave none"}
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="replay", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "replay", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("bag", type=Path, help="recording: a rosbag2 folder or an .mcap file")
     parser.add_argument(
         "--estimators", nargs="+", default=["wavg", "wavg:gyro=off", "ekf", "ekf:gyro=off"], metavar="NAME[:KEY=VALUE]",
@@ -44,8 +50,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; 0 when every asked-for estimator gave estimates."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: _run(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -12,18 +12,23 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.coverage import grid_of, layout_of_mission, map_cells
 from css_studies.coverage_figures import write_coverage_figures
 from css_studies.coverage_statistics import coverage_object
 
-USAGE = 2
-_EPILOG = "Exit code: 0 done, 2 the mission or an override is wrong, or a figure cannot be written."
+_EXAMPLES = (
+    "okeefe_2013",
+    "okeefe_2013 --set cells.field_of_view_deg=140 --figures maps",
+    "my_mission.yaml --json",
+)
+_EXITS = {2: "the mission or an override is wrong, or a figure cannot be written"}
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="coverage", description=__doc__, epilog=_EPILOG)
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "coverage", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument(
         "mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)"
     )
@@ -33,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         metavar="KEY=VALUE",
         dest="overrides",
-        help="change one parameter, for instance --set cells.field_of_view_deg=140; may be repeated",
+        help="change one parameter; may be repeated",
     )
     parser.add_argument(
         "--figures", type=Path, metavar="DIR", help="write the maps as PNG files into this folder"
@@ -46,13 +51,14 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    try:
-        mission = load_mission(options.mission, options.overrides)
-        result, files = study(mission, options.figures)
-    except (MissionError, OSError) as error:
-        print(f"coverage: {error}", file=sys.stderr)
-        return USAGE
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    return guarded(parser.prog, lambda: _run(options), (MissionError, OSError))
+
+
+def _run(options: argparse.Namespace) -> int:
+    mission = load_mission(options.mission, options.overrides)
+    result, files = study(mission, options.figures)
     _print_tables(result, Console(highlight=False))
     for file in files:
         print(f"figure: {file}")

@@ -21,6 +21,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
@@ -28,23 +29,18 @@ from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.schedulers import DaskScheduler
 from css_studies.monte_carlo.study_summary import study_object
 
-USAGE, INTERRUPTED = 2, 130
-
-_EPILOG = """examples:
-  monte-carlo okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off
-  monte-carlo okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2
-  monte-carlo okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786
-
+_EXAMPLES = (
+    "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
+    "okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2",
+    "okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786",
+)
+_NOTES = """\
 Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
-percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for.
-
-Exit code: 0 done, 2 something asked for is wrong, 130 interrupted."""
+percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for."""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="monte-carlo", description=__doc__, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "monte_carlo", __doc__, _EXAMPLES, notes=_NOTES)
     add = parser.add_argument
     add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
     add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
@@ -71,17 +67,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     # a killed terminal or `kill` end it as Ctrl-C does: finished chunks stay
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        return _run(options)
-    except (MissionError, StudyError) as error:
-        print(f"monte-carlo: {error}", file=sys.stderr)
-        return USAGE
-    except KeyboardInterrupt:
-        print("monte-carlo: interrupted; the same command with the same --out goes on from here", file=sys.stderr)
-        return INTERRUPTED
+    interrupted = "interrupted; the same command with the same --out goes on from here"
+    return guarded(parser.prog, lambda: _run(options), (MissionError, StudyError), interrupted=interrupted)
 
 
 def _run(options: argparse.Namespace) -> int:

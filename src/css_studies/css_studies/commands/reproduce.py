@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import StudyError
 from css_studies.monte_carlo.progress import progress_bar
@@ -21,13 +22,13 @@ from css_studies.monte_carlo.study import Progress
 from css_studies.reproduce.papers import Paper, ReproductionError, Request, find_paper, paper_names
 from css_studies.reproduce.rows import Row, full_name, number, printed, row_object
 
-USAGE, INTERRUPTED = 2, 130
 CASES, QUICK_CASES = 1000, 40
-_EPILOG = "Exit code: 0 done, also when numbers miss, 2 an argument or the folder is wrong, 130 interrupted."
+_EXAMPLES = ("okeefe", "clark --quick", "digregorio --cases 200 --out reports/mine")
+_EXITS = {0: "done, also when numbers miss", 2: "an argument or the folder is wrong"}
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="reproduce", description=__doc__, epilog=_EPILOG)
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "reproduce", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("paper", metavar="PAPER", help=f"one of: {', '.join(paper_names())}")
     parser.add_argument(
         "--cases", type=int, metavar="N", help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES})"
@@ -40,17 +41,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     # a killed terminal or `kill` end it as Ctrl-C does: finished flights stay
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        return _run(options)
-    except (ReproductionError, MissionError, StudyError, OSError) as error:
-        print(f"reproduce: {error}", file=sys.stderr)
-        return USAGE
-    except KeyboardInterrupt:
-        print("reproduce: interrupted; the same command goes on from here", file=sys.stderr)
-        return INTERRUPTED
+    wrong = (ReproductionError, MissionError, StudyError, OSError)
+    interrupted = "interrupted; the same command goes on from here"
+    return guarded(parser.prog, lambda: _run(options), wrong, interrupted=interrupted)
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -14,6 +14,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from css_common.command import FAILED, CommandParser, command_parser, complain, guarded
 from css_common.schema import ParameterError, Values, default_values
 from css_common.sections import SLITS, conflicts
 from css_estimation import slit_measurement
@@ -23,14 +24,16 @@ from css_estimation.slit_record import SlitRecord, read_record
 from css_studies.slit_file import SlitFileError, read_slit_file
 from css_studies.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure
 
-FAILED, USAGE = 1, 2
-_EPILOG = (
-    "Exit code: 0 done, 1 the pulses make no passage, 2 an option or the file is wrong or a figure cannot be written."
+_EXAMPLES = (
+    "my_pulses.csv",
+    "my_pulses.csv --frequency 1e6 --inertia-ratio 0.7 --figures figures",
+    "my_pulses.csv --window 69.2:188 --window 188:300 --passages passages.csv",
 )
+_EXITS = {1: "the pulses make no passage", 2: "an option or the file is wrong, or a figure cannot be written"}
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="slit_analyse", description=__doc__, epilog=_EPILOG)
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "slit_analyse", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("file", type=Path, help="CSV file with the columns slit (upper, vertical, lower) and count")
     parser.add_argument("--frequency", type=float, default=1e6, metavar="HZ", help="of the timer (default: 1e6)")
     parser.add_argument("--inclination-deg", type=float, default=30.0, metavar="DEG", help="of the slanted slits (30)")
@@ -51,27 +54,25 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    return guarded(parser.prog, lambda: _run(parser.prog, options), (SlitFileError, ParameterError, OSError))
+
+
+def _run(prog: str, options: argparse.Namespace) -> int:
     console = Console(highlight=False)
-    try:
-        values = _values(options)
-        record = _record(options, values)
-        if not len(record.passages.time):
-            print(
-                f"slit_analyse: {options.file}: no passage in {record.pulses} pulses: {_refusals(record)}",
-                file=sys.stderr,
-            )
-            return FAILED
-        windows = _windows(options, values, record)
-        result = _result_object(record, windows)
-        _print(console, options, record, windows)
-        if options.passages is not None:
-            _write_passages(options.passages, record)
-        for file in _figures(options.figures, record, windows):
-            console.print(f"figure: {file}", soft_wrap=True)
-    except (SlitFileError, ParameterError, OSError) as error:
-        print(f"slit_analyse: {error}", file=sys.stderr)
-        return USAGE
+    values = _values(options)
+    record = _record(options, values)
+    if not len(record.passages.time):
+        complain(prog, f"{options.file}: no passage in {record.pulses} pulses: {_refusals(record)}")
+        return FAILED
+    windows = _windows(options, values, record)
+    result = _result_object(record, windows)
+    _print(console, options, record, windows)
+    if options.passages is not None:
+        _write_passages(options.passages, record)
+    for file in _figures(options.figures, record, windows):
+        console.print(f"figure: {file}", soft_wrap=True)
     if options.json:
         print(json.dumps(result, allow_nan=False))
     return 0
