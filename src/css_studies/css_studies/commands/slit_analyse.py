@@ -29,7 +29,10 @@ _EXAMPLES = (
     "my_pulses.csv --frequency 1e6 --inertia-ratio 0.7 --figures figures",
     "my_pulses.csv --window 69.2:188 --window 188:300 --passages passages.csv",
 )
-_EXITS = {1: "the pulses make no passage", 2: "an option or the file is wrong, or a figure cannot be written"}
+_EXITS = {
+    1: "the pulses make no passage, or the coning period is ambiguous",
+    2: "an option or the file is wrong, or a figure cannot be written",
+}
 
 
 def _parser() -> CommandParser:
@@ -75,7 +78,10 @@ def _run(prog: str, options: argparse.Namespace) -> int:
         console.print(f"figure: {file}", soft_wrap=True)
     if options.json:
         print(json.dumps(result, allow_nan=False))
-    return 0
+    ambiguous = [name for name, coning in windows.items() if coning is not None and coning.rivals]
+    for name in ambiguous:
+        complain(prog, f"coning, {name}: the period is ambiguous, see the candidates")
+    return FAILED if ambiguous else 0
 
 
 def _values(options: argparse.Namespace) -> Values:
@@ -168,6 +174,7 @@ def _window_object(name: str, coning: Coning | None) -> dict[str, Any]:
                 for candidate, residual in zip(coning.candidates, coning.residuals, strict=True)
             ],
             "chosen": coning.chosen,
+            "rivals": list(coning.rivals),
             "because": justification(coning),
         },
     }
@@ -207,7 +214,7 @@ def _candidate_table(coning: Coning) -> Table:
         table.add_column(heading, justify="right")
     for i, (candidate, residual) in enumerate(zip(coning.candidates, coning.residuals, strict=True)):
         table.add_row(
-            "chosen" if i == coning.chosen else "",
+            "chosen" if i == coning.chosen else "as good" if i in coning.rivals else "",
             f"{candidate.frequency:.4f}",
             f"{1.0 / candidate.frequency:.4f}",
             f"{1.0 / candidate.sequence_frequency:.4f}",
