@@ -63,6 +63,7 @@ def _mark_events(above: Axes, below: Axes, events: Sequence[Event]) -> None:
             ha="right" if is_late else "left",
             fontsize=_SMALL,
             color=DARK_GREY,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},  # the next event's line ends there
         )
 
 

@@ -16,8 +16,6 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from rich.table import Table
-
 from css_bringup import monte_carlo_bench
 from css_bringup.flight import FlightResult
 from css_bringup.flying import fly
@@ -26,6 +24,7 @@ from css_bringup.options import complain, console, guarded, whole_number
 from css_bringup.report import print_json
 from css_common.command import FAILED, CommandParser, command_parser
 from css_common.mission import Mission, load_mission
+from css_studies.readable_table import ReadableTable
 
 _CONFIGURATIONS = {
     "composed": (False, False),
@@ -82,10 +81,13 @@ def _bench_graph(arguments: argparse.Namespace) -> int:
                 return FAILED
             measured[name].append(result)
     figures = {name: _figures(results) for name, results in measured.items()}
-    table = Table("graph", "real-time factor", "CPU us per step", "messages lost")
+    table = ReadableTable()
+    table.add_name("graph")
+    for heading in ("real-time\nfactor", "CPU us\nper step", "messages\nlost"):
+        table.add_number(heading)
     for name, row in figures.items():
-        table.add_row(
-            name, f"{row['realtime_factor']:.0f}", f"{row['cpu_us_per_step']:.0f}", str(row["messages_lost"])
+        table.add_texts(
+            [name, f"{row['realtime_factor']:.0f}", f"{row['cpu_us_per_step']:.0f}", str(row["messages_lost"])]
         )
     console.print(table)
     if arguments.json:

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
@@ -18,6 +16,7 @@ from css_common.mission_file import MissionError
 from css_studies.coverage import grid_of, layout_of_mission, map_cells
 from css_studies.coverage_figures import write_coverage_figures
 from css_studies.coverage_statistics import coverage_object
+from css_studies.readable_table import ReadableTable
 
 _EXAMPLES = (
     "okeefe_2013",
@@ -85,24 +84,22 @@ def study(mission: Mission, figures: Path | None = None) -> tuple[dict[str, Any]
 
 
 def _print_tables(result: dict[str, Any], console: Console) -> None:
-    seen = Table(
-        title=f"{result['mission']}: {result['cells']} cells", title_justify="left", box=box.SIMPLE_HEAD
-    )
-    seen.add_column("cells that see the Sun")
-    seen.add_column("share of the sphere, %", justify="right")
+    seen = ReadableTable(f"{result['mission']}: {result['cells']} cells")
+    seen.add_name("cells that see the Sun")
+    seen.add_number("share of the\nsphere, %")
     for count, fraction in enumerate(result["seen_by_fraction"]):
-        seen.add_row(f"{count}", f"{100.0 * fraction:.2f}")
+        seen.add_texts([f"{count}", f"{100.0 * fraction:.2f}"])
     console.print(seen)
     if not result["holes"]:
         console.print(" holes: none")
     for hole in result["holes"]:
         console.print(f" hole: {_hole(hole)}", soft_wrap=True)
-    errors = Table(title="weighted average, angles in deg", title_justify="left", box=box.SIMPLE_HEAD)
-    errors.add_column("Sun angles are from the array normal", no_wrap=True)
-    errors.add_column("ideal cosine", justify="right")
-    errors.add_column("warped", justify="right")
+    errors = ReadableTable("weighted average, angles in deg")
+    errors.add_name("Sun angles are from the array normal")
+    errors.add_number("ideal\ncosine")
+    errors.add_number("warped")
     for label, texts in _error_rows(result["wavg_ideal"], result["wavg_warped"]):
-        errors.add_row(label, *texts)
+        errors.add_texts([label, *texts])
     console.print(errors)
 
 

@@ -10,16 +10,14 @@ import argparse
 import itertools
 import json
 import os
+import re
 import signal
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
@@ -28,6 +26,7 @@ from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.schedulers import DaskScheduler
 from css_studies.monte_carlo.study_summary import study_object
+from css_studies.readable_table import ReadableTable
 
 _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
@@ -157,18 +156,8 @@ _COLUMNS = (
 
 
 def print_study(study: Study, result: dict, console: Console) -> None:
-    """A table for each point of the sweeps, and where the files are."""
-    for point, rows in itertools.groupby(result["configurations"], key=lambda row: row["overrides"]):
-        title = " ".join(point) or None
-        table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title=title, title_justify="left")
-        for name in ("estimator", "gyro"):
-            table.add_column(name, vertical="bottom")
-        for _, heading, _ in _COLUMNS:
-            table.add_column(Text(heading), justify="right", vertical="bottom")
-        for row in rows:
-            figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
-            table.add_row(row["estimator"], row["gyro"], *figures)
-        console.print(table)
+    """One table of all configurations, the values of a sweep below each other, and where the files are."""
+    console.print(_study_table(result["configurations"]))
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
@@ -177,6 +166,28 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     else:
         console.print("this study was complete; nothing was flown")
     console.print(f"study: {study.folder}", soft_wrap=True)
+
+
+def _study_table(rows: Sequence[dict]) -> ReadableTable:
+    table = ReadableTable()
+    table.add_name("estimator")
+    table.add_number("gyro")
+    for key in _swept(rows[0]):
+        table.add_number(re.sub(r"(?<=[._])", "\n", key))
+    for _, heading, _ in _COLUMNS:
+        table.add_number(heading)
+    # configurations go point by point; what one estimator makes of a sweep is read down a column
+    kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
+    for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
+        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+        table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
+    return table
+
+
+def _swept(row: dict) -> dict[str, str]:
+    """Values of a configuration by the keys that are swept."""
+    pairs = (override.partition("=") for override in row["overrides"])
+    return {key: value for key, _, value in pairs}
 
 
 if __name__ == "__main__":

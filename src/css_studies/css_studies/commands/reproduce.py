@@ -9,9 +9,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from css_common.command import CommandParser, command_parser, guarded
@@ -19,6 +17,7 @@ from css_common.mission_file import MissionError
 from css_studies.monte_carlo import StudyError
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.study import Progress
+from css_studies.readable_table import ReadableTable
 from css_studies.reproduce.papers import Paper, ReproductionError, Request, find_paper, paper_names
 from css_studies.reproduce.rows import Row, full_name, number, printed, row_object
 
@@ -74,15 +73,14 @@ def _run(options: argparse.Namespace) -> int:
 
 def _print_table(paper: Paper, rows: Sequence[Row], console: Console) -> None:
     variants = list(dict.fromkeys(row.variant for row in rows))
-    # without a frame around the columns it fits into 80, which is what a console has that is no terminal
-    table = Table(title=paper.title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("quantity", no_wrap=True)
+    table = ReadableTable(paper.title)
+    table.add_name("quantity")
     for text in ("paper", *(variant or "here" for variant in variants)):
-        table.add_column(Text(text), justify="right", no_wrap=True)
+        table.add_number(text)
     for quantity, unit in dict.fromkeys((row.quantity, row.unit) for row in rows):
         same = {row.variant: row for row in rows if row.quantity == quantity}
         results = [_result(same.get(variant)) for variant in variants]
-        table.add_row(Text(f"{quantity} [{unit}]"), Text(printed(next(iter(same.values())))), *results)
+        table.add_texts([f"{quantity} [{unit}]", printed(next(iter(same.values()))), *results])
     console.print(table)
     for row in rows:
         if not row.ok:

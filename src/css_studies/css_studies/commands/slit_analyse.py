@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
 from css_common.command import FAILED, CommandParser, command_parser, complain, guarded
 from css_common.schema import ParameterError, Values, default_values
@@ -21,6 +19,7 @@ from css_estimation import slit_measurement
 from css_estimation.coning import Coning, analyse_coning, justification
 from css_estimation.slit_passage import REASONS
 from css_estimation.slit_record import SlitRecord, read_record
+from css_studies.readable_table import ReadableTable
 from css_studies.slit_file import SlitFileError, read_slit_file
 from css_studies.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure
 
@@ -208,19 +207,29 @@ def _print(
         console.print(f"period {1.0 / coning.frequency:.4f} s: {justification(coning)}", soft_wrap=True)
 
 
-def _candidate_table(coning: Coning) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
-    for heading in ("", "frequency Hz", "period s", "FFT period s", "inertia ratio", "power", "pulses missed by us"):
-        table.add_column(heading, justify="right")
+def _candidate_table(coning: Coning) -> ReadableTable:
+    table = ReadableTable()
+    table.add_name()
+    for heading in (
+        "frequency\n[Hz]",
+        "period\n[s]",
+        "FFT\nperiod\n[s]",
+        "inertia\nratio",
+        "power",
+        "pulses\nmissed\nby [us]",
+    ):
+        table.add_number(heading)
     for i, (candidate, residual) in enumerate(zip(coning.candidates, coning.residuals, strict=True)):
-        table.add_row(
-            "chosen" if i == coning.chosen else "as good" if i in coning.rivals else "",
-            f"{candidate.frequency:.4f}",
-            f"{1.0 / candidate.frequency:.4f}",
-            f"{1.0 / candidate.sequence_frequency:.4f}",
-            f"{candidate.inertia_ratio:.3f}",
-            f"{candidate.power:.4f}",
-            "-" if residual < 0.0 else f"{1e6 * residual:.3g}",
+        table.add_texts(
+            [
+                "chosen" if i == coning.chosen else "as good" if i in coning.rivals else "",
+                f"{candidate.frequency:.4f}",
+                f"{1.0 / candidate.frequency:.4f}",
+                f"{1.0 / candidate.sequence_frequency:.4f}",
+                f"{candidate.inertia_ratio:.3f}",
+                f"{candidate.power:.4f}",
+                "-" if residual < 0.0 else f"{1e6 * residual:.3g}",
+            ]
         )
     return table
 
