@@ -27,7 +27,7 @@ class ReadableTable(Table):
         Args:
             title: printed above it.
         """
-        super().__init__(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
+        super().__init__(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=0)
 
     def add_name(self, heading: str = "") -> None:
         """Adds a column of words, which may be folded."""

@@ -120,7 +120,7 @@ def test_a_sweep_is_one_table_with_the_values_below_each_other():
         ["ekf", "on", "0.1", "0.5", "3000.00"],
         ["ekf", "on", "0.25", "0.5", "5000.00"],
     ]
-    assert "css_array.scale_cell_error: 0.25" in printed(_study_table(SWEEP), 30)
+    assert "css_array.scale_cell_error: 0.25" in printed(_study_table(SWEEP), 40)
 
 
 @pytest.mark.parametrize("width", [40, 80])
