@@ -1,50 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
 """Keeps every pytest process, and the processes it starts, in a ROS domain of its own; settles hypothesis.
 
-Two graphs in one domain answer each other's stamps. A run of pytest, each of its xdist workers, and runs of other
-users on the same machine therefore hold a domain number each, by a lock that ends with the process. Loaded for all
-tests of the project, with or without ROS, and before any of them imports rclpy.
+Two graphs in one domain answer each other's stamps. A run of pytest, each of its xdist workers, and flights of any
+user on the same machine therefore hold a domain each, until they end. Loaded for all tests of the project, with or
+without ROS, and before any of them imports rclpy.
 """
 
 import atexit
-import contextlib
-import fcntl
 import os
 import shutil
 import signal
+import sys
 import tempfile
 from pathlib import Path
 
 from hypothesis import settings
 
-# Above 101 the ports of a domain reach into those that Linux hands to outgoing connections.
-DOMAINS = range(1, 102)
+sys.path.append(str(Path(__file__).parent / "src" / "css_common"))  # also where nothing is built
 
+from css_common import domains, network
 
-def _hold_domain() -> tuple[int, int]:
-    """A domain number that no other test process has, and the open file whose lock keeps it so."""
-    folder = Path("/tmp/sunpoint-test-domains")
-    with contextlib.suppress(FileExistsError):
-        folder.mkdir()
-        folder.chmod(0o777)  # other users' tests take their domains from the same numbers
-    first = os.getpid() % len(DOMAINS)  # spread out: a domain just given up may still have participants leaving it
-    for domain in (*DOMAINS[first:], *DOMAINS[:first]):
-        file = os.open(folder / str(domain), os.O_RDONLY | os.O_CREAT, 0o644)
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(file)
-        else:
-            return domain, file
-    raise RuntimeError(f"all ROS domains {DOMAINS[0]} to {DOMAINS[-1]} are held by test processes; see {folder}")
-
-
-DOMAIN, _lock = _hold_domain()
+os.environ.pop(network.NETWORK, None)
+network.stay_on_this_machine(os.environ)
+_held = domains.hold_for_tests(os.environ)
+DOMAIN = _held.domain
 _logs = tempfile.mkdtemp(prefix="sunpoint-test-logs-")
 atexit.register(shutil.rmtree, _logs, ignore_errors=True)
 
-os.environ["ROS_DOMAIN_ID"] = str(DOMAIN)
-os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
 os.environ["ROS_LOG_DIR"] = _logs
 # Without it rclpy stores a value of the wrong type as garbage, without a word.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"

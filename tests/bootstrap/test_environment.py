@@ -6,7 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from bootstrap.environment import changes, compose, ros_source, toolchain, without_other_sunpoint
+from bootstrap.environment import (
+    changes,
+    compose,
+    ros_source,
+    toolchain,
+    without_foreign_python,
+    without_other_sunpoint,
+)
 from bootstrap.project import Environment, Project, Refusal
 from bootstrap.requirements import blocks, for_system
 
@@ -54,13 +61,34 @@ def test_system_environment_leaves_ros_as_sourced(tmp_path):
 
 def test_defaults_yield_to_the_user(tmp_path):
     tools = toolchain(Project(tmp_path), "wheels")
-    assert compose({}, tools)["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
-    chosen = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "RMW_IMPLEMENTATION": "x", "MPLBACKEND": "svg"}
+    assert compose({}, tools)["RMW_IMPLEMENTATION"] == "rmw_fastrtps_cpp"
+    chosen = {"RMW_IMPLEMENTATION": "x", "MPLBACKEND": "svg"}
     env = compose({**chosen, "OMP_NUM_THREADS": "3"}, tools)
     assert {name: env[name] for name in chosen} == chosen
     assert env["OMP_NUM_THREADS"] == "3"
     assert env["SUNPOINT_HOME"] == str(tmp_path)
     assert env["ROS_LOG_DIR"].startswith(str(tmp_path))
+
+
+def test_logs_of_another_users_checkout_are_the_users_own(tmp_path, monkeypatch):
+    tools = toolchain(Project(tmp_path / "project"), "wheels")
+    monkeypatch.setattr("css_common.places.may_write", lambda folder: not folder.is_relative_to(tmp_path / "project"))
+    env = compose({"XDG_CACHE_HOME": str(tmp_path)}, tools)
+    assert (env["ROS_HOME"], env["ROS_LOG_DIR"]) == (f"{tmp_path}/sunpoint/log", f"{tmp_path}/sunpoint/log/ros")
+
+
+def test_python_folders_of_strangers_are_left_out():
+    ros, overlay, strange = "/opt/ros/jazzy/lib/python3.12/site-packages", "/ws/build/mine", "/home/me/tools"
+    env = {
+        "PYTHONPATH": f"{strange}:{ros}::{overlay}:/opt/ros/jazzy2",
+        "AMENT_PREFIX_PATH": "/ws/install/mine:/opt/ros/jazzy",
+        "COLCON_PREFIX_PATH": "/ws/install/",
+    }
+    cleaned, left_out = without_foreign_python(env)
+    assert cleaned == {**env, "PYTHONPATH": f"{ros}:{overlay}"}
+    assert left_out == [strange, "/opt/ros/jazzy2"]
+    assert without_foreign_python({"PYTHONPATH": strange}) == ({}, [strange])
+    assert without_foreign_python({"A": "b"}) == ({"A": "b"}, [])
 
 
 def test_composing_twice_adds_nothing(tmp_path):

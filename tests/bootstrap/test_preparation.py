@@ -17,6 +17,7 @@ from bootstrap.plan import Need
 from bootstrap.progress import CommandFailed, Step, run
 from bootstrap.project import Project, Refusal, State
 from bootstrap.work import Work
+from css_common import places
 
 
 @pytest.fixture
@@ -68,7 +69,7 @@ def test_errors_of_the_file_system_are_explained(project, monkeypatch, number, e
 
 START = """
     import pathlib, sys, time
-    sys.path.insert(0, {tools!r})
+    sys.path[:0] = {paths!r}
     from bootstrap import workspace
     from bootstrap.plan import Need
     from bootstrap.project import Project
@@ -92,8 +93,8 @@ START = """
 
 
 def start(project, command):
-    tools = os.path.dirname(os.path.dirname(workspace.__file__))
-    code = textwrap.dedent(START).format(tools=tools, root=str(project.root), command=command)
+    paths = [os.path.dirname(os.path.dirname(module.__file__)) for module in (workspace, places)]
+    code = textwrap.dedent(START).format(paths=paths, root=str(project.root), command=command)
     return subprocess.Popen([sys.executable, "-I", "-S", "-c", code], stderr=subprocess.PIPE, text=True)
 
 

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verbs: help, unknown names, and that each names an executable of a package."""
 
+import re
+from pathlib import Path
+
 import pytest
 
+from bootstrap import checks, cli
 from bootstrap.cli import main
+from bootstrap.project import Project
 from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
+from bootstrap.version import version_text
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"], ["help"]])
@@ -38,3 +44,39 @@ def test_executables_are_names_of_modules():
     for verb in VERBS.values():
         assert bool(verb.package) == bool(verb.executable)
         assert verb.executable.isidentifier() or not verb.executable
+
+
+def test_version(capsys):
+    assert main(["--version"]) == 0
+    assert re.fullmatch(r"sunpoint \d+\.\d+\.\d+( \([0-9a-f]+(-dirty)?\))?\n", capsys.readouterr().out)
+
+
+def test_version_without_a_checkout(tmp_path):
+    manifest = tmp_path / "src" / "css_bringup" / "package.xml"
+    manifest.parent.mkdir(parents=True)
+    manifest.write_text("<package><version>1.2.3</version></package>")
+    assert version_text(Project(tmp_path)) == "sunpoint 1.2.3"
+    (tmp_path / ".git").mkdir()
+    assert version_text(Project(tmp_path)) == "sunpoint 1.2.3"
+
+
+@pytest.fixture
+def started(monkeypatch):
+    """What the verbs become, and which linters ran."""
+    happened = []
+    monkeypatch.setattr(cli, "find_need", lambda *_: False)
+    monkeypatch.setattr(cli, "_replace_process", lambda command, env: happened.append(command[2:]) or 0)
+    monkeypatch.setattr(checks, "failing_linters", lambda project, env: happened.append("linters") or [])
+    monkeypatch.chdir(Path.cwd())
+    return happened
+
+
+def test_linters_run_with_all_tests_and_on_request(started):
+    assert main(["test"]) == 0
+    assert main(["lint"]) == 0
+    assert started == ["linters", ["pytest", "-q", "-n", "2"], "linters"]
+
+
+def test_named_tests_run_alone(started):
+    assert main(["test", "tests/test_verbs.py"]) == 0
+    assert started == [["pytest", "tests/test_verbs.py"]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The verb `test`: ruff, mypy and pytest in the project's environment."""
+"""The verbs `test` and `lint`: ruff, mypy and pytest in the project's environment."""
 
 from __future__ import annotations
 

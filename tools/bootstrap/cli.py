@@ -8,10 +8,11 @@ import signal
 import sys
 from pathlib import Path
 
-from bootstrap.environment import compose, ros_source, without_other_sunpoint
+from bootstrap.environment import compose, ros_source, without_foreign_python, without_other_sunpoint
 from bootstrap.plan import find_need
 from bootstrap.project import Project, Refusal, State
-from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
+from bootstrap.verbs import JOINING, JOINING_OPTIONS, OWN_USAGE, VERBS, help_text, unknown_verb
+from css_common.network import NetworkError, stay_on_this_machine
 
 # Two processes, because every test of the graph waits for its nodes more than it computes.
 ALL_TESTS = ["-q", "-n", "2"]
@@ -22,6 +23,12 @@ def main(arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(help_text())
         return 0
+    project = Project(Path(__file__).resolve().parents[2])
+    if arguments[0] == "--version":
+        from bootstrap.version import version_text
+
+        print(version_text(project))
+        return 0
     verb, *rest = arguments
     if verb not in VERBS:
         print(unknown_verb(verb), file=sys.stderr)
@@ -29,28 +36,43 @@ def main(arguments: list[str]) -> int:
     if verb in OWN_USAGE and rest[:1] in (["-h"], ["--help"]):
         print(OWN_USAGE[verb])
         return 0
-    project = Project(Path(__file__).resolve().parents[2])
     try:
         return _start(project, verb, rest)
+    except NetworkError as error:
+        _say(str(error))
+        return 2
     except Refusal as refusal:
-        print(f"sunpoint: {refusal}", file=sys.stderr)
+        _say(str(refusal))
         if refusal.remedy:
             print(f"  {refusal.remedy}", file=sys.stderr)
-        return 1
+        return refusal.exit_code
     except KeyboardInterrupt:
-        print("sunpoint: interrupted", file=sys.stderr)
+        _say("interrupted")
         return 130
 
 
+def _say(line: str) -> None:
+    print(f"sunpoint: {line}", file=sys.stderr, flush=True)
+
+
 def _start(project: Project, verb: str, arguments: list[str]) -> int:
-    base = without_other_sunpoint(os.environ)
+    base, foreign = without_foreign_python(without_other_sunpoint(os.environ))
     ros = ros_source(base)
     state = State.load(project.state_file)
-    if find_need(project, ros, state, with_tests=verb == "test"):
-        state = _prepare(project, ros, base, with_tests=verb == "test")
+    with_tests = verb in ("test", "lint")
+    if find_need(project, ros, state, with_tests):
+        state = _prepare(project, ros, base, with_tests)
     env = compose(base, state.environment)
+    if foreign:
+        _say(f"PYTHONPATH is left out but for a sourced ROS: {os.pathsep.join(foreign)}")
+    if note := stay_on_this_machine(env):
+        _say(note)
+    if verb == "lint":
+        return _lint(project, env)
     if verb == "test":
         return _test(project, arguments, {**env, "ROS_PYTHON_CHECK_FIELDS": "1"})
+    if verb in JOINING:
+        env, arguments = _join(verb, env, arguments)
     if verb == "shell":
         return _replace_process(_shell(project, arguments), {"ROS_PYTHON_CHECK_FIELDS": "1", **env})
     package, executable = VERBS[verb].package, VERBS[verb].executable
@@ -71,12 +93,33 @@ def _prepare(project: Project, ros: str, base: dict[str, str], with_tests: bool)
         sys.exit(stop.exit_code)
 
 
+def _lint(project: Project, env: dict[str, str]) -> int:
+    """Run ruff and mypy."""
+    from bootstrap.checks import failing_linters
+
+    return 1 if failing_linters(project, env) else 0
+
+
 def _test(project: Project, arguments: list[str], env: dict[str, str]) -> int:
-    """Run ruff and mypy, then become pytest."""
+    """Run ruff and mypy unless some tests are named, then become pytest."""
     from bootstrap.checks import failing_linters, pytest_command
 
     os.chdir(project.root)
-    return _replace_process(pytest_command(project, arguments or ALL_TESTS, failing_linters(project, env)), env)
+    failing = [] if arguments else failing_linters(project, env)
+    return _replace_process(pytest_command(project, arguments or ALL_TESTS, failing), env)
+
+
+def _join(verb: str, env: dict[str, str], arguments: list[str]) -> tuple[dict[str, str], list[str]]:
+    """Enter the ROS domain of the running flight, or the one that is asked for; the rest of the command line."""
+    if verb != "shell" and {"-h", "--help"}.intersection(arguments):
+        print(f"./sunpoint {verb} takes besides the options below:\n{JOINING_OPTIONS}\n")
+        return env, arguments
+    from bootstrap.joining import join, split_wish
+
+    wish, arguments = split_wish(arguments, before_words=verb == "shell")
+    env, why = join(env, wish)
+    _say(why)
+    return env, arguments
 
 
 def _shell(project: Project, arguments: list[str]) -> list[str]:

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 
 from bootstrap.project import Environment, Project, Refusal
+from css_common import places
 
 DISTRIBUTION = "jazzy"
 WHEELS = "wheels"
@@ -30,6 +32,27 @@ def without_other_sunpoint(env: Mapping[str, str]) -> dict[str, str]:
         for name in ("ROS_DISTRO", WHEELS_GUARD):
             cleaned.pop(name, None)
     return cleaned
+
+
+def without_foreign_python(env: Mapping[str, str]) -> tuple[dict[str, str], list[str]]:
+    """The environment with only those folders of PYTHONPATH that belong to a sourced ROS or workspace; the others.
+
+    Modules in PYTHONPATH stand before the environment's own, so that a stranger's numpy.py would take numpy's place.
+    """
+    cleaned = dict(env)
+    entries = [entry for entry in cleaned.pop("PYTHONPATH", "").split(os.pathsep) if entry]
+    sourced = [os.path.join(prefix, "") for prefix in _prefixes(env)]
+    kept = [entry for entry in entries if os.path.join(entry, "").startswith(tuple(sourced))]
+    if kept:
+        cleaned["PYTHONPATH"] = os.pathsep.join(kept)
+    return cleaned, [entry for entry in entries if entry not in kept]
+
+
+def _prefixes(env: Mapping[str, str]) -> Iterator[str]:
+    for name in ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH", "COLCON_PREFIX_PATH"):
+        yield from filter(None, env.get(name, "").split(os.pathsep))
+    for install in filter(None, env.get("COLCON_PREFIX_PATH", "").split(os.pathsep)):
+        yield os.path.join(os.path.dirname(install.rstrip(os.sep)), "build")  # of --symlink-install
 
 
 def ros_source(env: Mapping[str, str]) -> str:
@@ -79,10 +102,11 @@ def compose(base: Mapping[str, str], environment: Environment) -> dict[str, str]
     for name, entries in environment.prepend.items():
         rest = [part for part in env.get(name, "").split(os.pathsep) if part and part not in entries]
         env[name] = os.pathsep.join([*entries, *rest])
-    root = environment.assign["SUNPOINT_HOME"]
-    env.setdefault("ROS_HOME", os.path.join(root, "log"))
-    env.setdefault("ROS_LOG_DIR", os.path.join(root, "log", "ros"))
-    env.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    logs = Path(environment.assign["SUNPOINT_HOME"], "log")
+    if not {"ROS_HOME", "ROS_LOG_DIR"} <= env.keys() and not places.may_write(logs):
+        logs = places.scratch("log", env)
+    env.setdefault("ROS_HOME", str(logs))
+    env.setdefault("ROS_LOG_DIR", str(logs / "ros"))
     env.setdefault("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     env.setdefault("MPLBACKEND", "Agg")
     return env

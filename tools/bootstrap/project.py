@@ -10,11 +10,15 @@ from pathlib import Path
 
 
 class Refusal(Exception):
-    """Something is missing or wrong on this machine; `remedy` is the command or step that mends it."""
+    """Something is missing or wrong on this machine; `remedy` is the command or step that mends it.
 
-    def __init__(self, problem: str, remedy: str = "") -> None:
+    `exit_code` is 1, or 2 for what the user got wrong.
+    """
+
+    def __init__(self, problem: str, remedy: str = "", exit_code: int = 1) -> None:
         super().__init__(problem)
         self.remedy = remedy
+        self.exit_code = exit_code
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+JOINING_OPTIONS = """\
+  --flight NAME|PID  join this flight when several are running: its mission, recording or process
+  --domain N         join this ROS domain
+The ROS domain is that of --domain, --flight or ROS_DOMAIN_ID, else that of the running flight, else 0."""
+
 
 class Verb(NamedTuple):
     """One verb; without a package it is done by the bootstrap itself."""
@@ -27,9 +32,13 @@ VERBS = {
     "coverage": Verb("map how well a cell layout sees the Sun", "css_studies", "coverage"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_studies", "reproduce"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_studies", "slit_analyse"),
-    "test": Verb("run ruff, mypy and all tests; arguments go to pytest"),
+    "test": Verb("run the linters and all tests, or with arguments those tests alone"),
+    "lint": Verb("run ruff and mypy over everything"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
 }
+
+
+JOINING = ("shell", "record", "play")
 
 
 def help_text() -> str:
@@ -46,21 +55,30 @@ Quick start (the first command sets everything up inside this folder, once):
 Usage: ./sunpoint VERB [ARGUMENTS]
 {table}
 
-./sunpoint VERB --help explains one verb."""
+A flight has a ROS domain for itself. shell, record and play join it; when several are running,
+--flight NAME|PID or --domain N chooses.
+
+./sunpoint VERB --help explains one verb, ./sunpoint --version says which version this is."""
 
 
 OWN_USAGE = {
     "test": """Usage: ./sunpoint test [PYTEST ARGUMENTS]
 
-Runs ruff, mypy and pytest with message type checks on, and fails if any of them does. Examples:
-  ./sunpoint test                                  all tests, on two processors (pytest -q -n 2)
-  ./sunpoint test src/css_common/test -k attitude  some tests
+Runs pytest with message type checks on; without arguments ruff and mypy too, and fails if any of them does.
+  ./sunpoint test                                  linters and all tests, on two processors (pytest -q -n 2)
+  ./sunpoint test tests/test_processes.py          these tests alone
+  ./sunpoint test src/css_common/test -k attitude  some of those
 All options: ./sunpoint shell -c 'pytest --help'""",
-    "shell": """Usage: ./sunpoint shell [-c COMMAND | BASH ARGUMENTS]
+    "lint": """Usage: ./sunpoint lint
+
+Runs ruff and mypy over everything, and fails if one of them does.""",
+    "shell": f"""Usage: ./sunpoint shell [--flight NAME|PID | --domain N] [-c COMMAND | BASH ARGUMENTS]
 
 Opens bash with the environment that the verbs run in: ros2, colcon, python and every built package.
 With -c it runs one command and ends with its exit code. Message type checks are on; for timed runs
-switch them off with ROS_PYTHON_CHECK_FIELDS=0.""",
+switch them off with ROS_PYTHON_CHECK_FIELDS=0.
+
+{JOINING_OPTIONS}""",
 }
 """Help of the verbs that have no executable to give it."""
 

@@ -40,7 +40,10 @@ def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: boo
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise disk_full(project) from None
         if error.errno in (errno.EACCES, errno.EROFS):
-            raise Refusal(f"cannot write {error.filename}", "use a folder that is your own") from None
+            raise Refusal(
+                f"cannot write {error.filename}, where Sunpoint is to be installed and built",
+                "copy the project into a folder of your own, or let its owner run ./sunpoint shell -c true once",
+            ) from None
         raise
 
 

@@ -8,14 +8,15 @@ from pathlib import Path
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
-from css_bringup.flight import FlightResult, Progress, Stopped
-from css_common.executor import create_executor, spin_until
+from css_bringup.flight import FlightResult, Progress, Stopped, as_flown
+from css_bringup.incidents import node_incidents
+from css_common.executor import create_executor, retire, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.node_process import create_node
 from css_common.plant_host import PlantNode
-from css_recording.recorder import RecorderNode
+from css_recording.recorder import INCIDENTS, RecorderNode
 
 _PROGRESS_EVERY = 0.2
 
@@ -54,11 +55,15 @@ class ComposedFlight:
     def __enter__(self) -> "ComposedFlight":
         self.context.init()
         self.executor = create_executor(self._executor_kind, self.context)
-        mission = self.mission
+        mission = as_flown(self.mission, recorded=self.bag is not None)
         if self.bag is not None:
-            mission = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
             self.recorder = RecorderNode(
-                self.mission, self.bag, overwrite=self._overwrite, context=self.context, use_global_arguments=False
+                self.mission,
+                self.bag,
+                overwrite=self._overwrite,
+                in_flight=True,
+                context=self.context,
+                use_global_arguments=False,
             )
             self.executor.add_node(self.recorder)
         for node in mission.nodes:
@@ -72,8 +77,7 @@ class ComposedFlight:
         if self.recorder is not None:
             self.recorder.close()
         for node in (*self.nodes.values(), *filter(None, [self.recorder])):
-            self.executor.remove_node(node)
-            node.destroy_node()
+            retire(self.executor, node)
         self.executor.shutdown()
         self.context.try_shutdown()
 
@@ -125,15 +129,17 @@ class ComposedFlight:
         flown_ns = plant.stamp_ns - self.mission.epoch_ns if plant.begun else -self.mission.period_ns
         result.steps = flown_ns // self.mission.period_ns + 1
         result.simulated_s = result.steps * self.mission.period_ns * 1e-9
+        result.notes += node_incidents(self.mission, {n: node.health().counters for n, node in self.nodes.items()})
         if self.recorder is not None:
             self._drain(self.recorder)
-            self.recorder.close()
+            faults = self.recorder.faults()
+            self.recorder.close({INCIDENTS: "\n".join((*result.notes, *faults)) or "none"})
+            result.notes += [f"recorder: {fault}" for fault in faults]
             topics = {f"/{topic}" for topic in self.mission.topics}
             result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
             if self.recorder.failure:
                 result.failure = f"the flight is not recorded any more: {self.recorder.failure}"
-        if plant.counters["partners_lost"]:
-            result.notes.append(f"{plant.counters['partners_lost']} partners fell silent")
+        result.note_losses()
 
     def _drain(self, recorder: RecorderNode) -> None:
         # what was published last is still on its way: take until nothing more comes

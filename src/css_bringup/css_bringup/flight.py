@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every way to fly a mission gives back, and where its recording goes."""
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from pathlib import Path
 
+from css_bringup.incidents import lost_messages
+from css_common import places
 from css_common.mission import Mission
 
 Progress = Callable[[float], None]
@@ -30,7 +31,8 @@ class FlightResult:
         recorded: messages recorded, by absolute topic name.
         failure: why the flight ended early; empty on a good end.
         interrupted: the user asked it to end.
-        notes: what happened that a reader should know (restarts, partners lost).
+        notes: what was not as it should be (restarts, refusals, silence, losses).
+        domain: ROS domain that it had for itself; None when nobody chose one.
     """
 
     mission: Mission
@@ -43,6 +45,7 @@ class FlightResult:
     failure: str = ""
     interrupted: bool = False
     notes: list[str] = field(default_factory=list)
+    domain: int | None = None
 
     @property
     def realtime_factor(self) -> float:
@@ -59,18 +62,26 @@ class FlightResult:
         """Messages that the cycles flown must have produced and the recording lacks."""
         if self.bag is None:
             return 0
-        lost = 0
-        for topic, output in self.mission.outputs.items():
-            if output.events:
-                continue  # how many there were is not known from the cycles
-            expected = -(-self.steps // output.divider)
-            lost += max(0, expected - self.recorded.get(f"/{topic}", 0))
-        return lost
+        return sum(lost_messages(self.mission, self.steps, self.recorded).values())
+
+    def note_losses(self) -> None:
+        """Adds to the notes what the recording lacks."""
+        if self.bag is not None:
+            lost = lost_messages(self.mission, self.steps, self.recorded)
+            self.notes += [f"{topic}: {count} messages are not in the recording" for topic, count in lost.items()]
+
+
+def as_flown(mission: Mission, *, recorded: bool) -> Mission:
+    """A mission as its nodes get it in a flight: only nodes of the graph are heard, and a recorder is waited for."""
+    overrides = ["io.writers=graph"]
+    if recorded:
+        overrides += [f"lockstep.recorders={mission.values.lockstep.recorders + 1}", "lockstep.wait_for_recorder=true"]
+    return mission.with_overrides(overrides)
 
 
 def default_bag(mission: Mission, folder: Path | None = None) -> Path:
     """A fresh recording folder `bags/MISSION_case_TIME`, in the project when there is one."""
-    root = folder or Path(os.environ.get("SUNPOINT_HOME", ".")) / "bags"
+    root = folder or places.results("bags")
     now = datetime.now(UTC).strftime("%Y%m%d_%H%M%S")
     base = root / f"{mission.name}_{mission.values.mission.case}_{now}"
     bag, n = base, 1

@@ -3,7 +3,8 @@
 
 import os
 import sys
-from contextlib import nullcontext
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from rich.console import Console
@@ -13,8 +14,31 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from css_bringup.composed import ComposedFlight
 from css_bringup.flight import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
+from css_common import domains, network, places
 from css_common.mission import Mission
 from css_common.stop_signal import StopSignal
+
+
+@contextmanager
+def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: Console) -> Iterator[int]:
+    """A ROS domain that no other flight or test of the machine is in, for all that flies inside the context.
+
+    Args:
+        mission: what flies.
+        asked: the number after `--domain`, if any.
+        bag: where it is recorded, for others who ask.
+        console: where the domain is named.
+
+    Raises:
+        NetworkError: the number is none.
+        DomainError: another flight has the domain, or there is no free one.
+    """
+    recording = str(bag.absolute()) if bag else ""
+    with domains.own(os.environ, mission.name, recording=recording, asked=asked) as held:
+        os.environ[network.DOMAIN] = str(held.domain)
+        os.environ.pop(domains.JOINED, None)
+        console.print(f"ROS domain {held.domain}; ./sunpoint shell, record and play join it", soft_wrap=True)
+        yield held.domain
 
 
 def fly(
@@ -39,8 +63,9 @@ def fly(
 def _fly_processes(
     mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
 ) -> FlightResult:
-    home = Path(os.environ.get("SUNPOINT_HOME", "."))
-    logs = home / "log" / "flights" / (bag.name if bag else mission.name)
+    # without a recording, flights of one mission at the same time differ by their domain
+    flight = bag.name if bag else f"{mission.name}_domain_{os.environ.get(network.DOMAIN, '0')}"
+    logs = places.results("log") / "flights" / flight
     status = f"flying {mission.name}, one process per node; logs in {logs}"
     named = 0
 

@@ -9,8 +9,10 @@ from rich.console import Console
 from rich.text import Text
 
 from css_common import command
+from css_common.domains import DomainError
 from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError
+from css_common.network import NetworkError
 from css_common.schema import unknown_name
 from css_recording.errors import BagError
 from css_studies.flight_metrics import QUANTITIES
@@ -32,6 +34,13 @@ def add_mission_options(parser: argparse.ArgumentParser) -> None:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change one parameter, for instance --set ekf.use_gyro=false; may be repeated",
     )  # fmt: skip
+
+
+def add_domain_option(parser: argparse.ArgumentParser) -> None:
+    """Where a flight has its world for itself."""
+    parser.add_argument(
+        "--domain", metavar="N", help="ROS domain to fly in (default: ROS_DOMAIN_ID when set, else a free one)"
+    )
 
 
 def mission_of(arguments: argparse.Namespace) -> Mission:
@@ -92,4 +101,4 @@ def guarded(prog: str, run: Callable[[], int], failed: tuple[type[Exception], ..
         run: does the work and gives an exit code.
         failed: errors that become one line and exit code 1.
     """
-    return command.guarded(prog, run, (MissionError, BagError, FiguresError), failed)
+    return command.guarded(prog, run, (MissionError, BagError, FiguresError, DomainError, NetworkError), failed)

@@ -1,82 +1,37 @@
 # SPDX-License-Identifier: Apache-2.0
 """A mission flown with one process per node, supervised.
 
-A node that dies is restarted and named; a second death of the same node within a limit ends the run with its log.
-The plant is not restarted: the state of the spacecraft died with it.
+A node that dies or freezes is restarted and named; a second time of the same node within a limit ends the run with its
+log. The plant is not restarted: the state of the spacecraft died with it.
 """
 
+import contextlib
 import json
 import os
 import signal
-import subprocess
-import tempfile
 import time
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
-from css_bringup.flight import FlightResult, Stopped
+from css_bringup.child import Child
+from css_bringup.flight import FlightResult, Stopped, as_flown
+from css_bringup.incidents import node_incidents
+from css_bringup.warden import Warden
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
+from css_recording.bag_folder import prepare_folder
 
 RECORDER = "recorder"
 _POLL = 0.02
+_LOOK = 0.25  # wall time [s] between looks at whether the processes work
 _END_LIMIT = 30.0  # wall time [s] allowed to a process that was asked to end; a loaded machine needs seconds
 _RESTART_LIMIT = 60.0  # wall time [s] within which a second death of a node ends the run
-
-
-@dataclass
-class Child:
-    """One supervised process."""
-
-    name: str
-    command: list[str]
-    log: Path
-    process: subprocess.Popen | None = None
-    stream: IO[bytes] | None = None
-    deaths: list[float] = field(default_factory=list)
-    asked_to_end: bool = False
-
-    def start(self) -> None:
-        """Starts the process; its log begins anew with the flight and goes on after a restart."""
-        self.asked_to_end = False
-        self.stream = self.log.open("wb" if self.process is None else "ab")
-        # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
-        self.process = subprocess.Popen(
-            self.command, stdout=self.stream, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL, start_new_session=True
-        )
-
-    def poll(self) -> int | None:
-        """Exit code, or None while it runs."""
-        return self.process.poll() if self.process else None
-
-    def interrupt(self) -> None:
-        """Asks the process to end, if it runs; once, because an interpreter that is ending dies of a second SIGINT."""
-        if self.process is not None and self.process.poll() is None and not self.asked_to_end:
-            self.asked_to_end = True
-            self.process.send_signal(signal.SIGINT)
-
-    def stop(self, limit: float) -> None:
-        """Asks the process to end, and insists after `limit` seconds."""
-        if self.process is None:
-            return
-        self.interrupt()
-        try:
-            self.process.wait(limit)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-            self.process.wait()
-        if self.stream is not None:
-            self.stream.close()
-            self.stream = None
-
-    def log_tail(self, lines: int = 20) -> str:
-        """The end of its log."""
-        text = self.log.read_text(encoding="utf-8", errors="replace").splitlines()
-        return "\n".join(text[-lines:])
+# Wall times [s], and shares of the time for which the plant holds for a partner: after them a process counts as frozen.
+_STOPPED_LIMIT, _STOPPED_SHARE = 2.0, 0.25
+_SILENT_LIMIT, _SILENT_SHARE = 5.0, 0.5
 
 
 def executable_path(package: str, executable: str) -> str:
@@ -118,15 +73,19 @@ class Supervisor:
         self._overwrite = overwrite
         self.notes: list[str] = []
         self.failure = ""
-        self._folder = tempfile.TemporaryDirectory(prefix="sunpoint_")
-        logs.mkdir(parents=True, exist_ok=True)
-        flown = mission
-        if bag is not None:
-            flown = mission.with_overrides([f"lockstep.recorders={mission.values.lockstep.recorders + 1}"])
-        self._parameters = Path(self._folder.name) / f"{mission.name}.yaml"
-        self._parameters.write_text(flown.text(), encoding="utf-8")
-        self.children = {node.name: self._child(node.name, node.package, node.executable) for node in flown.nodes}
+        self._folder = logs / f"run_{os.getpid()}"  # gone when the flight is
+        self._parameters = self._folder / f"{mission.name}.flown.yaml"
+        self._mission_file = self._folder / f"{mission.name}.yaml"
+        self._notes_file = self._folder / "notes.json"
+        self.children = {node.name: self._child(node.name, node.package, node.executable) for node in mission.nodes}
         self.recorder = self._recorder() if bag is not None else None
+        hold_limit = mission.values.lockstep.hold_limit
+        self._limits = (
+            min(_STOPPED_LIMIT, _STOPPED_SHARE * hold_limit),
+            max(_SILENT_LIMIT, _SILENT_SHARE * hold_limit),
+        )
+        self._looked = time.monotonic()
+        self._warden: Warden | None = None
 
     def _child(self, name: str, package: str, executable: str) -> Child:
         command = [executable_path(package, executable), "--summary", str(self._summary(name)), "--ros-args"]
@@ -134,11 +93,12 @@ class Supervisor:
         return Child(name, command, self.logs / f"{name}.log")
 
     def _summary(self, name: str) -> Path:
-        return Path(self._folder.name) / f"{name}.summary.json"
+        return self._folder / f"{name}.summary.json"
 
     def _recorder(self) -> Child:
-        command = [executable_path("css_recording", RECORDER), "--mission", str(self._parameters)]
+        command = [executable_path("css_recording", RECORDER), "--mission", str(self._mission_file), "--in-flight"]
         command += ["--output", str(self.bag), "--summary", str(self._summary(RECORDER))]
+        command += ["--notes", str(self._notes_file)]
         command += ["--overwrite"] if self._overwrite else []
         return Child(RECORDER, command, self.logs / f"{RECORDER}.log")
 
@@ -148,33 +108,81 @@ class Supervisor:
         return self.children[self._plant_name]
 
     def start(self) -> None:
-        """Starts all processes, the plant last."""
-        first = [self.recorder] if self.recorder else []
-        for child in (*first, *(c for c in self.children.values() if c is not self.plant), self.plant):
-            child.start()
+        """Starts all processes, the plant last.
+
+        Raises:
+            BagError: there is something in the place of the recording, or it cannot be made.
+            MissionError: the logs cannot be written.
+        """
+        if self.bag is not None:
+            prepare_folder(self.bag, self._overwrite)
+        flown = as_flown(self.mission, recorded=self.bag is not None)
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._parameters.write_text(flown.text(), encoding="utf-8")
+            self._mission_file.write_text(self.mission.text(), encoding="utf-8")
+        except OSError as error:
+            raise MissionError(f"{self._folder}: logs cannot be written there: {error.strerror}") from error
+        self._warden = Warden(self._folder)
+        for child in sorted(self._all(), key=lambda child: child is self.plant):
+            self._start(child)
+
+    def _all(self) -> Iterator[Child]:
+        if self.recorder is not None:
+            yield self.recorder
+        yield from self.children.values()
+
+    def _start(self, child: Child) -> None:
+        pid = child.start()
+        if self._warden is not None:
+            self._warden.look_after(pid)
 
     def check(self) -> bool:
         """Looks after the processes once; False when the flight is over, well or not."""
-        code = self.plant.poll()
-        if code is not None:
-            if code != 0:
-                self._fail(self.plant, code, "the spacecraft's state is lost with it")
+        codes = {child.name: child.poll() for child in self._all()}
+        if codes[self._plant_name] == 0:
             return False
-        for child in (*self.children.values(), *filter(None, [self.recorder])):
-            code = child.poll()
-            if code is None:
+        frozen = self._frozen()
+        for child in self._all():
+            code = codes[child.name]
+            if code is not None:
+                what = f"died ({_cause(code)})"
+            elif child.name in frozen:
+                what = f"froze ({frozen[child.name]})"
+            else:
                 continue
-            now = time.monotonic()
-            child.deaths.append(now)
-            if child is self.recorder:
-                self._fail(child, code, "the flight is not recorded any more")
+            if not self._replace(child, what):
                 return False
-            if len(child.deaths) > 1 and now - child.deaths[-2] < _RESTART_LIMIT:
-                self._fail(child, code, f"for the second time within {_RESTART_LIMIT:g} s")
-                return False
-            self.notes.append(f"{child.name} died ({_cause(code)}) and was restarted")
-            child.stop(0.0)
-            child.start()
+        return True
+
+    def _frozen(self) -> dict[str, str]:
+        """Names of the processes that do not work, with the reason."""
+        now = time.monotonic()
+        if now - self._looked < _LOOK:
+            return {}
+        # a supervisor that was stopped itself has not been looking for so long
+        elapsed, self._looked = min(now - self._looked, 2.0 * _LOOK), now
+        frozen = {}
+        for child in self._all():
+            if child.pulse is not None:
+                child.pulse.look(elapsed)
+                frozen[child.name] = child.pulse.frozen(*self._limits)
+        return {name: reason for name, reason in frozen.items() if reason}
+
+    def _replace(self, child: Child, what: str) -> bool:
+        """Starts a process anew that died or froze; False when that cannot help."""
+        now = time.monotonic()
+        child.deaths.append(now)
+        if child is self.plant:
+            return self._fail(child, what, "the spacecraft's state is lost with it")
+        if child is self.recorder:
+            return self._fail(child, what, "the flight is not recorded any more")
+        if len(child.deaths) > 1 and now - child.deaths[-2] < _RESTART_LIMIT:
+            return self._fail(child, what, f"for the second time within {_RESTART_LIMIT:g} s")
+        self.notes.append(f"{child.name} {what} and was restarted")
+        child.kill()
+        child.stop(0.0)
+        self._start(child)
         return True
 
     def stop(self) -> None:
@@ -184,8 +192,13 @@ class Supervisor:
             child.interrupt()
         for child in self.children.values():
             child.stop(_END_LIMIT)
+        counters = {name: self.summary(name).get("counters", {}) for name in self.children}
+        self.notes += node_incidents(self.mission, counters)
         if self.recorder is not None:
+            with contextlib.suppress(OSError):  # a full disk; the notes are still shown
+                self._notes_file.write_text(json.dumps(self.notes), encoding="utf-8")
             self.recorder.stop(_END_LIMIT)
+            self.notes += [f"recorder: {fault}" for fault in self.summary(RECORDER).get("faults", [])]
 
     def summary(self, name: str) -> dict[str, Any]:
         """Figures that a process left at its end; empty when it was killed."""
@@ -194,12 +207,12 @@ class Supervisor:
 
     def clean(self) -> None:
         """Removes temporary files."""
-        self._folder.cleanup()
+        if self._warden is not None:
+            self._warden.dismiss()
 
-    def _fail(self, child: Child, code: int, consequence: str) -> None:
-        self.failure = (
-            f"{child.name} died ({_cause(code)}), {consequence}; its log {child.log} ends:\n{child.log_tail()}"
-        )
+    def _fail(self, child: Child, what: str, consequence: str) -> bool:
+        self.failure = f"{child.name} {what}, {consequence}; its log {child.log} ends:\n{child.log_tail()}"
+        return False
 
 
 def _cause(code: int) -> str:
@@ -255,6 +268,7 @@ def fly_processes(
     else:
         result.steps = _recorded_steps(mission, result.recorded)
     result.simulated_s = result.steps * mission.period_ns * 1e-9
+    result.note_losses()
     result.cpu_s = sum(supervisor.summary(name).get("cpu_s", 0.0) for name in (*supervisor.children, RECORDER))
     supervisor.clean()
     return result

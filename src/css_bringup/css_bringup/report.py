@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from css_bringup.flight import FlightResult
+from css_bringup.options import complain
 from css_common.mission import Mission
 from css_msgs.msg import ControlStatus
 from css_studies.flight_metrics import Run
@@ -53,7 +54,7 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
         cpu_s=result.cpu_s,
         recorded=result.messages_recorded,
         lost=result.messages_lost,
-    )
+    ) | {"domain": result.domain, "failure": result.failure, "incidents": result.notes}
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:
@@ -72,8 +73,14 @@ def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) ->
         console.print(
             f"{result.messages_recorded} messages recorded, {result.messages_lost} lost: {result.bag}", soft_wrap=True
         )
+
+
+def print_incidents(result: FlightResult) -> None:
+    """What was not as it should be, and why it ended early: the last lines of a flight."""
     for note in result.notes:
-        console.print(f"note: {note}")
+        complain("not as it should be:", note)
+    if result.failure:
+        complain("the flight failed:", result.failure)
 
 
 def print_json(value: Mapping[str, Any]) -> None:

@@ -8,6 +8,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
+from css_common.supervised import beat
+
 _PERIOD_S = 1.0
 
 
@@ -43,6 +45,7 @@ class Diagnostics:
         self._timer = node.create_timer(_PERIOD_S, self._publish, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def _publish(self) -> None:
+        beat()
         level, message, counters, stamp_ns = self._health()
         array = DiagnosticArray()
         array.header.stamp.sec, array.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)

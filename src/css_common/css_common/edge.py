@@ -12,10 +12,14 @@ from css_common.component import INERTIAL, Component, Input
 from css_common.schema import Values
 
 Report = Callable[[str], None]
-HISTORY = 10
-"""Messages that a subscription holds for a node. One that was restarted answers these again."""
+HISTORY = 100
+"""Messages that a topic holds for a node. One that was restarted answers these again."""
+
+ANSWERED_AGAIN = "answered_again"
+"""A restarted sender repeats what its predecessor sent: left out, but no fault."""
 
 _CONFIRMATIONS = 3
+CONFIRMATIONS_BACK = 10
 _MOST_PENDING = 64
 _NEVER = -(2**63)
 
@@ -25,8 +29,8 @@ class StampGuard:
 
     A stamp that repeats or goes back is refused, and so is one far ahead: a single damaged stamp must not lock
     out all that follow. When several messages in a row agree on a new time, the sender's clock really was set, or
-    a recording started over, and the guard follows; back in time only when there are more than a restarted sender
-    may repeat.
+    a recording started over, and the guard follows. A sender that has taken the place of another repeats stamps
+    first, as many as its topics hold for it; that is not its clock.
     """
 
     def __init__(self, largest_gap_ns: int) -> None:
@@ -34,14 +38,24 @@ class StampGuard:
         self.last: int | None = None
         self._candidate: int | None = None
         self._agreeing = 0
+        self._may_repeat = 0
+
+    def expect_repetitions(self) -> None:
+        """The next messages come from another sender, which may answer again what has been answered."""
+        self._may_repeat = HISTORY
+        self._candidate = None
 
     def refusal(self, stamp_ns: int) -> str | None:
-        """Why a stamp is refused (`stamp_repeated`, `stamp_back`, `stamp_jump`), or None when it may pass."""
+        """Why a stamp is refused (`answered_again`, `stamp_repeated`, `stamp_back`, `stamp_jump`); None: it passes."""
         last = self.last
         if last is None or 0 < stamp_ns - last <= self.largest_gap_ns:
             self.last = stamp_ns
             self._candidate = None
+            self._may_repeat = 0
             return None
+        if self._may_repeat and stamp_ns <= last:
+            self._may_repeat -= 1
+            return ANSWERED_AGAIN
         if stamp_ns == last:
             return "stamp_repeated"
         candidate = self._candidate
@@ -50,7 +64,7 @@ class StampGuard:
         else:
             self._agreeing = 1
         self._candidate = stamp_ns
-        if self._agreeing > (_CONFIRMATIONS if stamp_ns > last else HISTORY):
+        if self._agreeing > (_CONFIRMATIONS if stamp_ns > last else CONFIRMATIONS_BACK):
             self.last = stamp_ns
             self._candidate = None
             return None
@@ -71,6 +85,7 @@ class Edge:
         self.source = source
         self.codec = codec_of(source.message_type)
         self.accepted = 0
+        self.repeated = 0
         self.rejected: Counter[str] = Counter()
         io = values.io
         expected = io.inertial_frame if source.frame == INERTIAL else io.body_frame
@@ -91,10 +106,17 @@ class Edge:
             return None
         refusal = self._refusal(sample)
         if refusal is not None:
-            self._reject(*refusal)
+            if refusal[0] == ANSWERED_AGAIN:
+                self.repeated += 1
+            else:
+                self._reject(*refusal)
             return None
         self.accepted += 1
         return sample
+
+    def begin_again(self) -> None:
+        """Another sender takes over: stamps that were answered may come once more, which is no fault."""
+        self.guard.expect_repetitions()
 
     def _refusal(self, sample: Sample) -> tuple[str, str] | None:
         """Kind and detail of what is wrong with a message."""

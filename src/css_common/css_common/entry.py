@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """`main` of every installed executable: finds its module and keeps Ctrl-C and closed pipes from printing tracebacks.
 
-Nothing is imported here but the standard library, because what comes before the first line of a module cannot be
-guarded.
+Nothing is imported here but the standard library and modules that need no more, because what comes before the first
+line of a module cannot be guarded.
 """
 
 import importlib
@@ -12,6 +12,9 @@ import signal
 import sys
 from pathlib import Path
 
+from css_common import network, supervised
+
+_USAGE = 2
 _INTERRUPTED = 130
 
 
@@ -21,8 +24,11 @@ def main() -> int:
     if interrupt is signal.default_int_handler:
         # Libraries take an exception in the middle of their import badly: until they are there Ctrl-C just ends.
         signal.signal(signal.SIGINT, signal.SIG_DFL)
+    supervised.take_on()
     module = _module(Path(sys.argv[0]))
     signal.signal(signal.SIGINT, interrupt)
+    if not _settle_network(module.__name__):
+        return _USAGE
     try:
         code = _with_pipe(module.main)
     except KeyboardInterrupt:
@@ -42,6 +48,21 @@ def _module(executable: Path):
         if importlib.util.find_spec(f"{package}.{folder}") and importlib.util.find_spec(module):
             return importlib.import_module(module)
     raise SystemExit(f"{executable}: there is no {package}/nodes/{name}.py or {package}/commands/{name}.py")
+
+
+def _settle_network(module: str) -> bool:
+    """Keeps ROS on this machine; False, with one line, when the environment names a network or domain that is none."""
+    name = module.rpartition(".")[2]
+    try:
+        note = network.stay_on_this_machine(os.environ)
+        if ".nodes." in module and not {"-h", "--help"}.intersection(sys.argv[1:]):
+            network.domain_of(os.environ)  # a command that flies holds a domain, and asks itself
+    except network.NetworkError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return False
+    if note:
+        print(f"{name}: {note}", file=sys.stderr, flush=True)
+    return True
 
 
 def _with_pipe(run) -> int:

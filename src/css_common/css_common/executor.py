@@ -14,6 +14,7 @@ from rclpy._rclpy_pybind11 import RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
+from rclpy.node import Node
 from rclpy.utilities import get_default_context
 
 _CALLBACKS_BETWEEN_CHECKS = 64
@@ -39,12 +40,18 @@ class DrainingExecutor(SingleThreadedExecutor):
             before = taken
             for node in self.get_nodes():
                 for subscription in node.subscriptions:
+                    # an event waits for the end of this; a second writer must be known before its first message
+                    getattr(subscription, "before_taking", _nothing)()
                     with subscription.handle:
                         message = subscription.handle.take_message(subscription.msg_type, subscription.raw)
                     if message is not None:
                         taken += 1
                         subscription.callback(message[0])
         return taken
+
+
+def _nothing() -> None:
+    """There is nothing to do."""
 
 
 def create_executor(kind: str | None = None, context: Context | None = None) -> Executor:
@@ -63,6 +70,17 @@ def create_executor(kind: str | None = None, context: Context | None = None) -> 
     if kind == "draining":
         return DrainingExecutor(context=context)
     raise ValueError(f"SUNPOINT_EXECUTOR: {kind!r} given, expected events or draining")
+
+
+def retire(executor: Executor, node: Node) -> None:
+    """Destroys a node and takes it out of its executor, its subscriptions first: with several writers of a topic the
+    executor does not see the true one.
+    """
+    stop_listening = getattr(node, "stop_listening", None)
+    if stop_listening is not None:
+        stop_listening()
+    executor.remove_node(node)
+    node.destroy_node()
 
 
 def spin_until(

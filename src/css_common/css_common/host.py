@@ -9,6 +9,7 @@ import contextlib
 import time
 import traceback
 from collections import Counter
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -31,6 +32,13 @@ from css_common.edge import Edge, Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_common.schema import ParameterError, Values, shaped_values
+from css_common.sole_subscription import SoleSubscription
+from css_common.writers import writer_choice
+
+REJECTED = ".rejected."
+"""Between an input and the kind of refusal, in the names of counters."""
+STRANGER = ".stranger."
+"""Between a topic and the node that wrote it besides the one that is heard, in the names of counters."""
 
 _SUCCESS = TransitionCallbackReturn.SUCCESS
 _FAILURE = TransitionCallbackReturn.FAILURE
@@ -94,7 +102,7 @@ class ComponentNode(LifecycleNode):
         self._table = component_type.table()
         self._canonical = self._declare()
         self._output_ports: dict[str, tuple] = {}
-        self._subscriptions_made: list = []
+        self.subscriptions_made: list[SoleSubscription] = []
         self._events: list[Event] = []
         self._is_active = False
         self._seen_errors: set[str] = set()
@@ -191,7 +199,8 @@ class ComponentNode(LifecycleNode):
         for source in inputs:
             edge = Edge(source, values, self.get_logger().warning)
             self.edges[source.key] = edge
-            self._subscribe(source.message_type, source.topic, partial(self._receive, source.key, edge))
+            receive = partial(self._receive, source.key, edge)
+            self._subscribe(source.message_type, source.topic, receive, edge.begin_again)
         if self.mission.values.lockstep.realtime_factor > 0.0 and any(not i.required for i in inputs):
             self._deadline_timer = self.create_timer(values.io.deadline, self._run_overdue, clock=self._steady)
 
@@ -205,15 +214,19 @@ class ComponentNode(LifecycleNode):
         codec = codec_of(output.message_type)
         return publisher, codec, codec.real_fields(), output.topic
 
-    def _subscribe(self, message_type: type, topic: str, callback) -> None:
-        self._subscriptions_made.append(
-            self.create_subscription(
+    def _subscribe(
+        self, message_type: type, topic: str, callback: Callable[[bytes], None], on_hand_over=lambda: None
+    ) -> None:
+        self.subscriptions_made.append(
+            SoleSubscription(
+                self,
                 message_type,
                 topic,
                 callback,
                 LOOP_SUBSCRIPTION,
-                raw=True,
-                qos_overriding_options=_OVERRIDES,
+                writer_choice(self.mission, topic, self.get_namespace()),
+                overriding=_OVERRIDES,
+                on_hand_over=on_hand_over,
             )
         )
 
@@ -229,17 +242,21 @@ class ComponentNode(LifecycleNode):
 
     def _clean_up(self) -> None:
         self._is_active = False
-        for subscription in self._subscriptions_made:
-            self.destroy_subscription(subscription)
+        self.stop_listening()
         for publisher, *_ in self._output_ports.values():
             self.destroy_publisher(publisher)
         if self._deadline_timer is not None:
             self.destroy_timer(self._deadline_timer)
             self._deadline_timer = None
-        self._subscriptions_made.clear()
         self._output_ports.clear()
         self.edges.clear()
         self.component = self.matcher = None  # type: ignore[assignment]
+
+    def stop_listening(self) -> None:
+        """Ends all subscriptions; to be called while the executor still has the node."""
+        for subscription in self.subscriptions_made:
+            subscription.destroy()
+        self.subscriptions_made.clear()
 
     def destroy_node(self) -> None:
         """Destroys the node now; rclpy alone would leave it, and its name, to the garbage collector."""
@@ -372,8 +389,12 @@ class ComponentNode(LifecycleNode):
         counters = dict(self.counters)
         for key, edge in self.edges.items():
             counters[f"{key}.accepted"] = edge.accepted
+            counters[f"{key}.repeated"] = edge.repeated
             for kind, count in edge.rejected.items():
-                counters[f"{key}.rejected.{kind}"] = count
+                counters[f"{key}{REJECTED}{kind}"] = count
+        for subscription in self.subscriptions_made:
+            for node, count in subscription.refused.items():
+                counters[f"{subscription.topic}{STRANGER}{node}"] = count
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
@@ -381,5 +402,7 @@ class ComponentNode(LifecycleNode):
             return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
         if any(edge.rejected for edge in self.edges.values()):
             return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
+        if any(subscription.refused for subscription in self.subscriptions_made):
+            return Health(DiagnosticStatus.WARN, "other nodes write its topics too", counters, self._last_stamp)
         state = "active" if self._is_active else "inactive"
         return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)

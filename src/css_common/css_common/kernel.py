@@ -17,6 +17,8 @@ from typing import Any
 import llvmlite
 import numba
 
+from css_common import places
+
 KERNEL_PACKAGES = (
     "css_common",
     "css_environment",
@@ -49,12 +51,7 @@ def kernel_source_hash() -> str:
 
 def cache_folder() -> Path:
     """Folder of the compiled kernels: inside the project when started by `./sunpoint`, else the user's cache."""
-    home = os.environ.get("SUNPOINT_HOME")
-    if home:
-        base = Path(home) / ".cache"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "sunpoint"
-    return base / "kernels" / kernel_source_hash()
+    return places.scratch("kernels") / kernel_source_hash()
 
 
 def _use_cache_folder() -> None:

@@ -147,6 +147,11 @@ class Mission:
         return {output.topic: output.message_type for node in self.nodes for output in node.outputs}
 
     @cached_property
+    def publishers(self) -> dict[str, str]:
+        """Name of the node of the graph that publishes each topic."""
+        return {output.topic: node.name for node in self.nodes for output in node.outputs}
+
+    @cached_property
     def outputs(self) -> dict[str, Output]:
         """Every output of the graph by topic."""
         return {output.topic: output for node in self.nodes for output in node.outputs}

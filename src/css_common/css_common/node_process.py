@@ -23,6 +23,7 @@ from css_common.plant_host import PlantNode
 from css_common.schema import ParameterError, default_values, unknown_name
 from css_common.sections import GRAPH
 from css_common.stop_signal import StopSignal
+from css_common.supervised import beat
 
 USAGE_ERROR = 2
 # Wall times [s] at the end: for answers to the last stamp of a plant; for what is on its way to another node, and
@@ -115,6 +116,9 @@ class _Process:
 
     def end(self) -> None:
         """Gives everything up, the executor first: the middleware calls into it from threads of its own."""
+        if self._node is not None:
+            self._node.stop_listening()
+        beat()
         if self._executor is not None:
             self._executor.shutdown()
         if self._node is not None:
@@ -200,9 +204,7 @@ def describe(component_type: type[Component]) -> str:
         for i in component_type.inputs(name, values)
     ] or ["  nothing"]
     lines += ["", "Publishes:"]
-    lines += [
-        f"  {o.topic}  {type_name(o.message_type)}" for o in component_type.outputs(name, values)
-    ]
+    lines += [f"  {o.topic}  {type_name(o.message_type)}" for o in component_type.outputs(name, values)]
     lines += ["  /diagnostics  diagnostic_msgs/msg/DiagnosticArray", "", "Parameters (* may change in flight):"]
     for p in component_type.table():
         default = p.default if not (p.is_array and len(p.default) > 6) else f"{len(p.default)} values"

@@ -5,6 +5,7 @@ Lockstep is event driven: the plant leaves stamp k when every awaited topic has 
 (a partner that is silent is named, and after a limit the flight goes on without it) or, in real time, hold back.
 """
 
+import contextlib
 import time
 from collections.abc import Collection
 from functools import partial
@@ -13,11 +14,18 @@ from builtin_interfaces.msg import Time
 from rclpy.publisher import Publisher
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Header
 
 from css_common.codec import DecodeError, Sample, stamp_of
 from css_common.component import Outgoing, Plant
-from css_common.edge import Edge
+from css_common.edge import HISTORY, Edge
 from css_common.host import ComponentNode
+from css_common.qos import PROGRESS_TOPIC
+from css_common.sole_subscription import writers_of
+from css_common.writers import Writer, local_processes, runs
+
+_LEAD = HISTORY // 2  # steps ahead of the recorder: well within what a topic holds for it
+_LEASE = 30.0  # wall time [s] after which the middleware has forgotten a process that was killed
 
 
 class PlantNode(ComponentNode):
@@ -36,7 +44,10 @@ class PlantNode(ComponentNode):
         self._lost: set[str] = set()
         self._held_back: Outgoing | None = None
         self._begun = False
+        self._recorded_ns: int | None = None
         self._waiting_since = time.monotonic()
+        self._looked = self._silent_for = 0.0
+        self._looked_at = 0
         self._warned: set[str] = set()
         self._startup_timer: Timer | None = None
         self._pace_timer: Timer | None = None
@@ -74,9 +85,13 @@ class PlantNode(ComponentNode):
         for topic in awaited:
             if topic not in consumed:
                 self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
+        if lockstep.wait_for_recorder:
+            self._recorded_ns = self.mission.epoch_ns - self.component.period_ns
+            self._subscribe(Header, PROGRESS_TOPIC, self._note_recorded)
         if lockstep.publish_clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
-        self._watch = self.create_timer(min(0.5, lockstep.warn_after), self._watch_partners, clock=self._steady)
+        self._watch_every = min(0.5, 0.5 * lockstep.warn_after)
+        self._watch = self.create_timer(self._watch_every, self._watch_partners, clock=self._steady)
         # A step in which nobody is waited for goes on by a timer: the executor must get to partners that come back.
         self._go_on_timer = self.create_timer(1e-4, self._go_on, clock=self._steady)
         self._go_on_timer.cancel()
@@ -112,6 +127,7 @@ class PlantNode(ComponentNode):
         self._answers.clear()
         self._lost.clear()
         self._warned.clear()
+        self._recorded_ns = None
         super()._clean_up()
 
     def _end_startup(self) -> None:
@@ -133,13 +149,16 @@ class PlantNode(ComponentNode):
                 self._warned.update(absent)
                 self.get_logger().warning(f"the flight has not begun: {'; '.join(absent)}")
             return
-        if rivals and waited < lockstep.warn_after:
-            return  # a flight that has just ended may still be leaving
+        running = local_processes() if rivals else frozenset()
+        # a flight that has just ended may still be leaving, and one that was killed is known until its lease ends
+        leaving = lockstep.warn_after if any(runs(writer, running) for _, writer in rivals) else _LEASE
+        if rivals and waited < leaving:
+            return
         self._end_startup()
         if rivals:
             self.failed = (
-                f"another node publishes {', '.join(rivals)}: two flights in one ROS_DOMAIN_ID answer each other; "
-                "end the other one or set another ROS_DOMAIN_ID"
+                f"another node publishes {', '.join(f'{topic} ({writer.node})' for topic, writer in rivals)}: two "
+                "flights in one ROS_DOMAIN_ID answer each other; end the other one or set another ROS_DOMAIN_ID"
             )
         elif absent:
             self.failed = f"after {limit:g} s still absent: {'; '.join(absent)}"
@@ -157,8 +176,14 @@ class PlantNode(ComponentNode):
         else:
             self._go_to(self.mission.epoch_ns, outgoing)
 
-    def _rivals(self) -> list[str]:
-        return [topic for *_, topic in self._output_ports.values() if self.count_publishers(topic) > 1]
+    def _rivals(self) -> list[tuple[str, Writer]]:
+        """Other writers of what this node alone should write."""
+        rivals: list[tuple[str, Writer]] = []
+        for *_, topic in self._output_ports.values():
+            writers = writers_of(self, topic)
+            others = [writer for writer in writers if writer.node != self.get_fully_qualified_name()]
+            rivals += [(topic, writer) for writer in others or writers[1:]]
+        return rivals
 
     def _absent_partners(self) -> list[str]:
         absent = []
@@ -215,6 +240,15 @@ class PlantNode(ComponentNode):
         if sample is not None:
             self._take(key, edge.source.topic, sample.stamp_ns, sample)
 
+    def _note_recorded(self, data: bytes) -> None:
+        with contextlib.suppress(DecodeError):
+            self._recorded_ns = stamp_of(data)
+            self._advance_if_answered()
+
+    def _is_ahead_of_recorder(self) -> bool:
+        recorded = self._recorded_ns
+        return recorded is not None and self._stamp - recorded > _LEAD * self.component.period_ns
+
     def _note(self, topic: str, data: bytes) -> None:
         try:
             stamp_ns = stamp_of(data)
@@ -237,7 +271,7 @@ class PlantNode(ComponentNode):
     def _advance_if_answered(self) -> None:
         if not self._begun or self.done or not self._is_active or self._held_back is not None:
             return
-        if self.answered:
+        if self.answered and not self._is_ahead_of_recorder():
             self._advance()
 
     def _needed(self) -> Collection[str]:
@@ -277,15 +311,31 @@ class PlantNode(ComponentNode):
 
     # Partners that fall silent
 
+    def _silence(self) -> float:
+        """Wall time [s] of waiting while this node looked on; time in which it did not run itself is no silence."""
+        now = time.monotonic()
+        begin = max(self._waiting_since, self._looked, now - 2.0 * self._watch_every)
+        self._looked = now
+        self._silent_for = (self._silent_for if self._looked_at == self._stamp else 0.0) + now - begin
+        self._looked_at = self._stamp
+        return self._silent_for
+
     def _watch_partners(self) -> None:
         if not self._begun or self.done or not self._is_active or self._held_back is not None:
             return
-        silent_for = time.monotonic() - self._waiting_since
+        silent_for = self._silence()
         lockstep = self.component.values.lockstep
         missing = [self._awaited[key] for key in self._needed() if key not in self._answers]
+        not_recorded = not missing and self._is_ahead_of_recorder()
+        if not_recorded:
+            missing = [PROGRESS_TOPIC]
         if silent_for < lockstep.warn_after or not missing:
             return
-        if silent_for >= lockstep.hold_limit:
+        if silent_for >= lockstep.hold_limit and not_recorded:
+            self.failed = f"the recorder has said nothing for {silent_for:.1f} s"
+            self.get_logger().error(self.failed)
+            self.done = True
+        elif silent_for >= lockstep.hold_limit:
             self.get_logger().error(
                 f"no {', '.join(missing)} for {silent_for:.1f} s: going on without, actuators at rest until it is back"
             )
@@ -294,6 +344,7 @@ class PlantNode(ComponentNode):
             self._advance()
         elif not self._warned.issuperset(missing):
             self._warned.update(missing)
+            self.counters["time_held"] += 1
             self.get_logger().warning(
                 f"simulated time holds at {(self._stamp - self.mission.epoch_ns) / 1e9:.1f} s: "
                 f"waiting for {', '.join(missing)}"

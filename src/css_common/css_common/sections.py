@@ -211,6 +211,7 @@ LOCKSTEP: Table = (
         low=0.1,
     ),
     flag("lockstep.publish_clock", False, "also publish simulated time on /clock, for tools that follow it"),
+    flag("lockstep.wait_for_recorder", False, "hold the flight when its recorder falls behind"),
     integer("lockstep.recorders", 0, "-", "recorders that must be listening before the first step", low=0, high=16),
     real("lockstep.startup_limit", 180.0, "s", "wall time allowed for all partners to appear", low=0.1),
 )
@@ -226,6 +227,13 @@ IO: Table = (
     text("io.body_frame", "bus", "frame_id of body-frame messages"),
     text("io.inertial_frame", "eci", "frame_id of inertial messages"),
     texts("io.accepted_frames", (), "further frame_ids taken for the expected one, as hardware drivers name them"),
+    choice(
+        "io.writers",
+        "first",
+        ("first", "graph"),
+        "whose messages are taken: first: one writer a topic until it is gone, the mission's own before others; "
+        "graph: only the node that the mission names for a topic",
+    ),
     real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001),
     flag("autostart", True, "configure and activate without being asked"),
 )

@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from css_common.codec import Sample, codec_of
 from css_common.component import Component
-from css_common.executor import create_executor
+from css_common.executor import create_executor, retire
 from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.node_process import create_node
@@ -51,8 +51,7 @@ class Bench:
 
     def __exit__(self, *_: object) -> None:
         for node in reversed(self._nodes):
-            self.executor.remove_node(node)
-            node.destroy_node()
+            retire(self.executor, node)
         self.executor.shutdown()
         self.context.try_shutdown()
 
@@ -64,8 +63,7 @@ class Bench:
     def remove(self, node: Node) -> None:
         """Destroys a node at once, as if its process had ended."""
         self._nodes.remove(node)
-        self.executor.remove_node(node)
-        node.destroy_node()
+        retire(self.executor, node)
 
     def host(self, component: type[Component], mission: Mission, name: str, *, start: bool = True) -> ComponentNode:
         """A component in its node, configured and active unless `start` is False."""

@@ -233,6 +233,7 @@ def test_restarted_sender_that_answers_its_history_again_does_not_stop_the_cycle
         offered(matcher, ("a", k))
         assert arrive(k) == [(k, "ab")]
     offered(matcher, ("a", 100))
+    guard.expect_repetitions()
     again = [cycle for k in range(101 - HISTORY, 101) for cycle in arrive(k)]
     assert again == [(100, "ab")]
     assert matcher.set_back == 0

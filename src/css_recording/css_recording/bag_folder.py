@@ -8,13 +8,14 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO
 
+from css_common import places
 from css_recording.bag_metadata import METADATA_FILE
 from css_recording.errors import BagError
 
 
 def fresh_folder(name: str) -> Path:
     """A folder `bags/NAME_TIME` that does not exist yet, in the project when there is one."""
-    base = Path(os.environ.get("SUNPOINT_HOME", "."), "bags", f"{name}_{datetime.now(UTC):%Y%m%d_%H%M%S}")
+    base = places.results("bags") / f"{name}_{datetime.now(UTC):%Y%m%d_%H%M%S}"
     folder, number = base, 1
     while folder.exists():
         number += 1

@@ -54,6 +54,7 @@ class BagSummary(NamedTuple):
     end_ns: int
     counts: Sequence[int]  # messages of each topic
     ros_distro: str
+    notes: Mapping[str, str] = {}  # texts about the recording as a whole
 
 
 def absolute(topic: str) -> str:
@@ -114,7 +115,7 @@ def bag_information(topics: Sequence[Topic], hashes: Sequence[str], summary: Bag
                 "message_count": total,
             }
         ],
-        "custom_data": None,
+        "custom_data": dict(summary.notes) or None,
         "ros_distro": summary.ros_distro,
     }
 

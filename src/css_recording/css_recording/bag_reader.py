@@ -8,7 +8,7 @@ from typing import NamedTuple, Self
 
 from css_recording.bag_metadata import absolute
 from css_recording.bag_storage import TopicCount, open_storage
-from css_recording.bag_writer import METADATA_RECORD
+from css_recording.bag_writer import FLIGHT_RECORD, METADATA_RECORD
 from css_recording.errors import BagError
 
 LAST_NS = (1 << 63) - 1
@@ -89,12 +89,15 @@ class BagReader:
 
     @property
     def description(self) -> dict[str, str]:
-        """What Sunpoint says about the recording: mission, versions; empty for foreign recordings."""
-        entries: dict[str, str] = {}
+        """What Sunpoint says about the recording: mission, versions, notes made when it was closed.
+
+        Empty for foreign recordings. A note never hides what was written at the start.
+        """
+        entries: dict[str, dict[str, str]] = {FLIGHT_RECORD: {}, METADATA_RECORD: {}}
         for name, values in self.metadata:
-            if name == METADATA_RECORD:
-                entries.update(values)
-        return entries
+            if name in entries:
+                entries[name].update(values)
+        return entries[FLIGHT_RECORD] | entries[METADATA_RECORD]
 
     @property
     def mission_text(self) -> str | None:

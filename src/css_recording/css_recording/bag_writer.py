@@ -32,6 +32,8 @@ from css_recording.schemas import MessageSchema, schema_of
 from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
 
 METADATA_RECORD = "sunpoint"
+FLIGHT_RECORD = "sunpoint_flight"
+"""Texts known at the end of a flight; `metadata.yaml` has them too, as `custom_data`."""
 ROS_DISTRO = "jazzy"  # where no ROS is sourced
 
 
@@ -68,6 +70,7 @@ class BagWriter:
         self._index: dict[str, int] = {}
         self._channel_ids: list[int] = []
         self._counts: list[int] = []
+        self._notes: dict[str, str] = {}
         self._start_ns = self._end_ns = 0
         self._buffer = SecondBuffer(limits)
         self._open = True
@@ -149,6 +152,8 @@ class BagWriter:
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Store a named set of texts at once, between the messages: an event, a parameter that changed."""
         self._check_open()
+        if name == FLIGHT_RECORD:
+            self._notes.update(entries)
         with self._disk():
             self._output.add_metadata(name, entries)
 
@@ -163,17 +168,22 @@ class BagWriter:
         self._check_open()
         self._store(self._buffer.drain())
 
-    def close(self) -> None:
-        """Finish the recording. Closing it again does nothing."""
+    def close(self, notes: Mapping[str, str] | None = None) -> None:
+        """Finish the recording. Closing it again does nothing.
+
+        notes: what is known only now (how the flight ended, what was lost): the record `sunpoint_flight`.
+        """
         if not self._open:
             return
         self.flush()
+        if notes:
+            self.add_metadata(FLIGHT_RECORD, notes)
         self._finish()
 
     def _finish(self) -> None:
         """Write what stands at the end of a recording."""
         distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
-        summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro)
+        summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro, self._notes)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         with self._disk():
             # One record only: of several, some readers take the first and others the last.

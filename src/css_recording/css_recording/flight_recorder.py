@@ -9,7 +9,9 @@ import struct
 import time
 from collections import Counter
 from collections.abc import Mapping
+from typing import NamedTuple
 
+from css_common.edge import HISTORY
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.schemas import first_field_type, schema_of
@@ -28,13 +30,27 @@ def is_stamped(topic: Topic) -> bool:
     return first_field_type(topic.schema or schema_of(topic.type)) in _STAMPED_FIRST
 
 
+class Gap(NamedTuple):
+    """Messages of a topic that never came.
+
+    Attributes:
+        missing: how many, all gaps of the topic together.
+        first_ns: stamp of the first of them.
+    """
+
+    missing: int
+    first_ns: int
+
+
 class FlightRecorder:
     """Files messages as they arrive.
 
     Attributes:
         writer: the recording.
         counters: messages received with `gaps` (stamps missing before them), `repeated` or `back` (stamps that do
-            not go forward) and `unstamped` (no stamp of their own, or none that can be).
+            not go forward), `unstamped` (no stamp of their own, or none that can be), and `answered_again` (sent once
+            more by a node that was restarted, and not filed twice).
+        gaps: what is missing of each topic that has a fixed spacing and misses something.
     """
 
     def __init__(self, writer: BagWriter, spacing_ns: Mapping[str, int] | None = None) -> None:
@@ -46,6 +62,8 @@ class FlightRecorder:
         """
         self.writer = writer
         self.counters: Counter[str] = Counter()
+        self.gaps: dict[str, Gap] = {}
+        self._filed_by_another: dict[str, int] = {}
         self._spacing_ns = dict(spacing_ns or {})
         self._stamped = {topic.name: is_stamped(topic) for topic in writer.topics}
         self._last_ns: dict[str, int] = {}
@@ -74,40 +92,65 @@ class FlightRecorder:
         self._stamped[topic.name] = is_stamped(topic)
         self._received[topic.name] += 0
 
-    def receive(self, topic: str, data: bytes) -> None:
-        """Files one serialised message.
+    def hand_over(self, topic: str) -> None:
+        """The next messages of a topic come from another sender, which may repeat what is filed already."""
+        if topic in self._last_ns:
+            self._filed_by_another[topic] = HISTORY
+
+    def receive(self, topic: str, data: bytes) -> int | None:
+        """Files one serialised message; its own stamp [ns], if it has one.
 
         Raises:
             BagError: the recording cannot be written any more.
         """
-        self._received[topic] += 1
         if not self._stamped[topic] or len(data) < 12:
+            self._received[topic] += 1
             self._file_unstamped(topic, data)
-            return
+            return None
         seconds, nanoseconds = _STAMP.unpack_from(data, 4)
         stamp_ns = seconds * 1_000_000_000 + nanoseconds
+        if self._filed_by_another and self._is_repetition(topic, stamp_ns):
+            self.counters["answered_again"] += 1
+            return stamp_ns
+        self._received[topic] += 1
         if stamp_ns <= 0:  # a driver that leaves its header empty
             self._file_unstamped(topic, data)
-            return
+            return None
         last_ns = self._last_ns.get(topic)
         self._last_ns[topic] = stamp_ns
         if last_ns is not None and topic in self._spacing_ns and stamp_ns - last_ns != self._spacing_ns[topic]:
-            self._count_step(topic, stamp_ns - last_ns)
+            self._count_step(topic, last_ns, stamp_ns)
         if self._latest_ns is None or stamp_ns > self._latest_ns:
             self._latest_ns = stamp_ns
             if self._held:
                 self._release(stamp_ns)
         self.writer.write(topic, stamp_ns, data)
+        return stamp_ns
 
-    def close(self) -> None:
-        """Finishes the recording."""
+    def close(self, notes: Mapping[str, str] | None = None) -> None:
+        """Finishes the recording.
+
+        Args:
+            notes: what is known only now, for the record `sunpoint_flight` and `custom_data` of `metadata.yaml`.
+        """
         if not self.writer.closed:
             self._release(None)
-        self.writer.close()
+        self.writer.close(notes)
 
-    def _count_step(self, topic: str, step_ns: int) -> None:
-        if step_ns > self._spacing_ns[topic]:
+    def _is_repetition(self, topic: str, stamp_ns: int) -> bool:
+        left = self._filed_by_another.get(topic, 0)
+        if left and stamp_ns <= self._last_ns[topic]:
+            self._filed_by_another[topic] = left - 1
+            return True
+        self._filed_by_another.pop(topic, None)
+        return False
+
+    def _count_step(self, topic: str, last_ns: int, stamp_ns: int) -> None:
+        step_ns, spacing_ns = stamp_ns - last_ns, self._spacing_ns[topic]
+        if step_ns > spacing_ns:
             self.counters["gaps"] += 1
+            before = self.gaps.get(topic, Gap(0, last_ns + spacing_ns))
+            self.gaps[topic] = before._replace(missing=before.missing + max(1, round(step_ns / spacing_ns) - 1))
         else:
             self.counters["repeated" if step_ns == 0 else "back"] += 1
 

@@ -22,7 +22,7 @@ from rosgraph_msgs.msg import Clock
 
 from css_common.codec import stamp_of
 from css_common.diagnostics import Diagnostics, Health
-from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
+from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION, matching_qos
 from css_recording.bag_reader import BagMessage
 from css_recording.errors import BagError
 from css_recording.merged_bags import Recording
@@ -30,7 +30,7 @@ from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackRepor
 from css_recording.playback_choice import choose
 from css_recording.playback_pace import PlaybackPace
 from css_recording.player_controls import PlayerControls
-from css_recording.ros_topics import matching_qos, message_class_of, publishers_of_others
+from css_recording.ros_topics import message_class_of, publishers_of_others
 
 _SETTLED_AFTER = 2.0
 _SETTLE_LIMIT = 10.0

@@ -3,10 +3,14 @@
 
 It takes serialised messages and does not decode them. A topic is subscribed when its publishers are known, with the
 quality of service that they offer. The topics of the plant come last, when all others are matched: the plant waits
-for its listeners before it begins, and so no flight begins before the recorder hears all of it.
+for its listeners before it begins, and so no flight begins before the recorder hears all of it. In a flight the
+recorder also says how far it has come, and the plant does not go far ahead of that.
+
+Of a topic of the mission the messages of one writer are recorded; those of others are counted.
 """
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -15,24 +19,35 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.node import Node
-from rclpy.qos import qos_profile_parameter_events
+from rclpy.qos import QoSProfile, qos_profile_parameter_events
 from rclpy.serialization import deserialize_message
 from rclpy.subscription import Subscription
 
 from css_common.codec import type_name
 from css_common.diagnostics import Diagnostics, Health
+from css_common.epochs import format_utc
 from css_common.mission import Mission
-from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
+from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION, matching_qos
+from css_common.sole_subscription import SoleSubscription
+from css_common.writers import writer_choice
 from css_recording.bag_metadata import Topic, absolute
 from css_recording.errors import BagError
-from css_recording.flight_recorder import FlightRecorder
+from css_recording.flight_pacing import FlightPacing
+from css_recording.flight_recorder import FlightRecorder, Gap
 from css_recording.provenance import software_versions
 from css_recording.recording_choice import RecordingChoice
-from css_recording.ros_topics import matching_qos, message_class_of, recorded_qos
+from css_recording.ros_topics import message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
 from css_recording.split_bag_writer import SplitBagWriter
 
 PARAMETER_EVENTS = "/parameter_events"
+INCIDENTS = "incidents"
+"""Entry of a recording that says what was not as it should be in the flight, one a line, or `none`."""
+_MEANING = {
+    "repeated": "with the stamp of the one before",
+    "back": "with a stamp earlier than the one before",
+    "late": "too late for their place in the recording, kept out of order",
+}
 _LOOK_EVERY = 0.02
 _DISCOVER_EVERY = 0.2
 _WARN_AFTER = 5.0
@@ -55,6 +70,7 @@ class RecorderNode(Node):
         *,
         everything: bool = False,
         overwrite: bool = False,
+        in_flight: bool = False,
         choice: RecordingChoice | None = None,
         context: Context | None = None,
         use_global_arguments: bool = True,
@@ -67,6 +83,7 @@ class RecorderNode(Node):
             topics: further topics by name.
             everything: also every topic that appears.
             overwrite: replace a recording that is there.
+            in_flight: the mission is being flown and waits for this recorder; only nodes of its graph are recorded.
             choice: what is left out, quality of service, files; default: nothing, the strictest, one.
             context: ROS context.
             use_global_arguments: False in a composed process, where one command line serves many nodes.
@@ -81,7 +98,10 @@ class RecorderNode(Node):
         self._expected: dict[str, type | None] = {}
         self._last: set[str] = set()
         self._discovered: set[str] = set()
-        self._subscribed: dict[str, Subscription] = {}
+        self._mission = mission
+        self._in_flight = in_flight
+        self._names: dict[str, str] = {}
+        self._subscribed: dict[str, Subscription | SoleSubscription] = {}
         self._refused: set[str] = set()
         self._waited = 0.0
         try:
@@ -96,6 +116,7 @@ class RecorderNode(Node):
         steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = self.create_timer(self._look_every, self._look, clock=steady)
         self._diagnostics = Diagnostics(self, self.health)
+        self._pacing = FlightPacing(self, mission) if in_flight and mission is not None else None
 
     @property
     def ready(self) -> bool:
@@ -118,9 +139,32 @@ class RecorderNode(Node):
         return self._recorder.message_count
 
     @property
-    def counters(self) -> dict[str, int]:
+    def counters(self) -> Counter[str]:
         """What was not as it should be: gaps, stamps out of order, messages later than the hold-back time."""
-        return {**self._recorder.counters, "late": self._recorder.writer.late_messages}
+        return self._recorder.counters + Counter(late=self._recorder.writer.late_messages)
+
+    @property
+    def gaps(self) -> dict[str, Gap]:
+        """What is missing of each topic of the mission that misses something."""
+        return dict(self._recorder.gaps)
+
+    @property
+    def refused(self) -> dict[str, dict[str, int]]:
+        """Messages of other writers than the accepted one, by topic and node; they are not recorded."""
+        sole = {t: s for t, s in self._subscribed.items() if isinstance(s, SoleSubscription)}
+        return {topic: dict(subscription.refused) for topic, subscription in sole.items() if subscription.refused}
+
+    def faults(self) -> list[str]:
+        """What is missing or was left out, in one line each."""
+        lines = [
+            f"{topic}: {gap.missing} messages missing, the first stamped {format_utc(gap.first_ns)}"
+            for topic, gap in self.gaps.items()
+        ]
+        for topic, strangers in self.refused.items():
+            lines += [f"{topic}: {count} messages of {node} not recorded" for node, count in strangers.items()]
+        counted = self.counters
+        lines += [f"{counted[key]} messages {text}" for key, text in _MEANING.items() if counted[key]]
+        return lines
 
     def health(self) -> Health:
         """Level, one line and counters for /diagnostics."""
@@ -132,12 +176,21 @@ class RecorderNode(Node):
             return Health(DiagnosticStatus.WARN, "waiting for publishers", counters, stamp_ns)
         return Health(DiagnosticStatus.OK, "recording", counters, stamp_ns)
 
-    def close(self) -> None:
+    def close(self, notes: Mapping[str, str] | None = None) -> None:
         """Finishes the recording; again does nothing.
 
         A disk that refuses is reported and noted in `failure`.
+
+        Args:
+            notes: what is known of the flight at its end, for the recording itself.
         """
-        self._guarded(self._recorder.close)
+        self._guarded(partial(self._recorder.close, notes))
+
+    def stop_listening(self) -> None:
+        """Ends the subscriptions to topics; to be called while the executor still has the node."""
+        for subscription in self._subscribed.values():
+            if isinstance(subscription, SoleSubscription):
+                subscription.destroy()
 
     def _create(self, mission: Mission | None, bag: Path, overwrite: bool) -> FlightRecorder:
         metadata = software_versions()
@@ -152,7 +205,9 @@ class RecorderNode(Node):
                 if topic in self._choice.excluded:
                     continue
                 self._expected[topic] = output.message_type
-                spacing_ns[topic] = output.divider * mission.period_ns
+                self._names[topic] = name
+                if not output.events:
+                    spacing_ns[topic] = output.divider * mission.period_ns
                 recorded.append(Topic(topic, type_name(output.message_type), (recorded_qos(LOOP_PUBLISHER),)))
             if mission.plant is not None:
                 plant = (self.resolve_topic_name(output.topic) for output in mission.plant.outputs)
@@ -204,9 +259,16 @@ class RecorderNode(Node):
         return [
             topic
             for topic in topics
-            if topic not in self._refused
-            and (topic not in self._subscribed or self._subscribed[topic].get_publisher_count() == 0)
+            if topic not in self._refused and self._writers_of(topic) == 0
         ]
+
+    def _writers_of(self, topic: str) -> int:
+        subscription = self._subscribed.get(topic)
+        if subscription is None:
+            return 0
+        if isinstance(subscription, SoleSubscription):
+            return subscription.publisher_count
+        return subscription.get_publisher_count()
 
     def _subscribe_to(self, topics: Iterable[str]) -> None:
         for topic in sorted(topics):
@@ -225,24 +287,42 @@ class RecorderNode(Node):
                 self._refused.add(topic)
                 self.get_logger().warning(f"{topic} is not recorded: {error}")
                 continue
-            self._subscribed[topic] = self.create_subscription(
-                message_type,
-                topic,
-                partial(self._take, topic),
-                self._choice.qos.get(topic) or matching_qos(publishers, RECORDER_SUBSCRIPTION.depth),
-                raw=True,
-            )
+            offered = matching_qos(publishers, RECORDER_SUBSCRIPTION.depth)
+            self._subscribed[topic] = self._listen(topic, message_type, offered)
+
+    def _listen(self, topic: str, message_type: type, offered: QoSProfile) -> Subscription | SoleSubscription:
+        take = partial(self._take, topic)
+        asked = self._choice.qos.get(topic)
+        if self._mission is None or topic not in self._names:
+            # whose topic it is nobody knows, and some have many writers
+            return self.create_subscription(message_type, topic, take, asked or offered, raw=True)
+        choice = writer_choice(
+            self._mission, self._names[topic], self.get_namespace(), only=self._in_flight or None
+        )
+        qos = asked or (RECORDER_SUBSCRIPTION if self._in_flight else offered)  # not what a stranger offers
+        hand_over = partial(self._recorder.hand_over, topic)
+        return SoleSubscription(self, message_type, topic, take, qos, choice, on_hand_over=hand_over)
 
     # Messages
 
     def _take(self, topic: str, data: bytes) -> None:
-        if not self.failure:
-            self._guarded(partial(self._recorder.receive, topic, data))
+        if self.failure:
+            return
+        try:
+            stamp_ns = self._recorder.receive(topic, data)
+        except BagError as error:
+            self._fail(error)
+            return
+        if self._pacing is not None and stamp_ns is not None:
+            self._pacing.note(topic, stamp_ns)
 
     def _guarded(self, action: Callable[[], None]) -> None:
         try:
             action()
         except BagError as error:
-            if not self.failure:
-                self.failure = str(error)
-                self.get_logger().error(f"recording ended: {error}")
+            self._fail(error)
+
+    def _fail(self, error: BagError) -> None:
+        if not self.failure:
+            self.failure = str(error)
+            self.get_logger().error(f"recording ended: {error}")

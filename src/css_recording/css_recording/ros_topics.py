@@ -2,7 +2,6 @@
 """Topics of the live graph in the words of a recording, and back."""
 
 import importlib
-from collections.abc import Iterable
 
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
@@ -39,23 +38,6 @@ def recorded_qos(profile: QoSProfile) -> QosProfile:
         _DURABILITY.get(profile.durability, "unknown"),
         _HISTORY.get(profile.history, "unknown"),
         profile.depth,
-    )
-
-
-def matching_qos(publishers: Iterable[TopicEndpointInfo], depth: int) -> QoSProfile:
-    """The strictest subscription that matches every one of the publishers.
-
-    A reliable or latched subscription is not matched by a publisher that offers less: a driver that publishes
-    with best effort would be silently left out.
-    """
-    offered = [publisher.qos_profile for publisher in publishers]
-    reliable = all(qos.reliability != ReliabilityPolicy.BEST_EFFORT for qos in offered)
-    latched = all(qos.durability == DurabilityPolicy.TRANSIENT_LOCAL for qos in offered)
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
     )
 
 

@@ -101,7 +101,8 @@ class SplitBagWriter(BagWriter):
         """Completes the file that is being written, with metadata as if it were the whole recording."""
         counts = self._in_this_file_by_topic()
         start_ns, end_ns = (self._file_start_ns, self._file_end_ns) if any(counts) else (0, 0)
-        summary = BagSummary(self.path.name, start_ns, end_ns, counts, os.environ.get("ROS_DISTRO", ROS_DISTRO))
+        distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
+        summary = BagSummary(self.path.name, start_ns, end_ns, counts, distro, self._notes)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         with self._disk():
             self._output.add_metadata("rosbag2", {"serialized_metadata": serialized_metadata(information)})
@@ -120,7 +121,7 @@ class SplitBagWriter(BagWriter):
     def _information(self) -> dict[str, Any]:
         """What `metadata.yaml` says: the whole recording, and its files."""
         distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
-        summary = BagSummary("", self._start_ns, self._end_ns, self._counts, distro)
+        summary = BagSummary("", self._start_ns, self._end_ns, self._counts, distro, self._notes)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         for key in ("relative_file_paths", "files"):
             information[key] = [entry for part in self._finished for entry in part[key]]

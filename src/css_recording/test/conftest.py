@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from css_common.executor import create_executor
+from css_common.executor import create_executor, retire
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.schemas import dependencies, schema_of
@@ -132,8 +132,7 @@ class Graph:
     def close(self) -> None:
         """Take everything down."""
         for node in self.nodes:
-            self.executor.remove_node(node)
-            node.destroy_node()
+            retire(self.executor, node)
         self.executor.shutdown()
         self.context.try_shutdown()
 

@@ -10,9 +10,12 @@ import yaml
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Chunk, MessageIndex
 from mcap.stream_reader import StreamReader
+from rosbags.rosbag2 import Reader
 
 from css_recording.bag_metadata import QosProfile, Topic, parse_qos
+from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
+from css_recording.recovery import recover
 from css_recording.schemas import schema_of
 
 QOS = QosProfile("best_effort", "transient_local", "keep_last", 7)
@@ -164,6 +167,26 @@ def test_messages_stand_in_log_time_order_with_running_sequence_numbers(recordin
 
 def test_mission_and_versions_are_in_the_file(recording):
     assert file_metadata(recording, "sunpoint") == [{"mission": "x", "numba": "1"}]
+
+
+def test_notes_made_at_the_end_are_in_the_file_and_in_the_custom_data(flight, tmp_path):
+    with BagWriter(tmp_path / "bag", flight.topics, {"mission": "x"}) as writer:
+        writer.close({"messages_lost": "3", "mission": "y"})
+    expected = {"messages_lost": "3", "mission": "y"}
+    with writer.path.open("rb") as file:
+        records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    assert records["sunpoint_flight"] == expected
+    assert yaml.safe_load(records["rosbag2"]["serialized_metadata"])["custom_data"] == expected
+    information = yaml.safe_load((tmp_path / "bag" / "metadata.yaml").read_text())
+    assert information["rosbag2_bagfile_information"]["custom_data"] == expected
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.storage.metadata.custom == expected
+    with BagReader(tmp_path / "bag") as reader:
+        assert reader.description == {"mission": "x", "messages_lost": "3"}
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    recover(tmp_path / "bag")
+    with Reader(tmp_path / "bag") as reader:
+        assert reader.storage.metadata.custom == expected
 
 
 def test_a_bare_file_carries_everything_the_yaml_file_says(recording, information, tmp_path):

@@ -18,11 +18,11 @@ from typing import Any
 
 from css_bringup import monte_carlo_bench
 from css_bringup.flight import FlightResult
-from css_bringup.flying import fly
+from css_bringup.flying import fly, own_domain
 from css_bringup.json_process import MeasurementError
-from css_bringup.options import complain, console, guarded, whole_number
+from css_bringup.options import add_domain_option, complain, console, guarded, whole_number
 from css_bringup.report import print_json
-from css_common.command import FAILED, CommandParser, command_parser
+from css_common.command import CommandParser, command_parser
 from css_common.mission import Mission, load_mission
 from css_studies.readable_table import ReadableTable
 
@@ -46,10 +46,11 @@ def _parser() -> CommandParser:
     graph.add_argument(
         "--repeats", type=whole_number, default=3, help="flights of each kind; medians are printed (default: 3)"
     )
+    add_domain_option(graph)
     graph.set_defaults(run=_bench_graph)
     monte_carlo = subjects.add_parser("monte-carlo", help="the Monte Carlo beside Basilisk")
     monte_carlo_bench.add_options(monte_carlo)
-    monte_carlo.set_defaults(run=_bench_monte_carlo)
+    monte_carlo.set_defaults(run=monte_carlo_bench.run)
     for subject in (graph, monte_carlo):
         subject.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser
@@ -59,27 +60,20 @@ def main(args: list[str] | None = None) -> int:
     """Entry point."""
     parser = _parser()
     arguments = parser.parse_args(args)
-    return guarded(parser.prog, lambda: arguments.run(arguments), (MeasurementError,))
+    return guarded(parser.prog, lambda: _run(arguments), (MeasurementError,))
 
 
-def _bench_monte_carlo(arguments: argparse.Namespace) -> int:
-    monte_carlo_bench.run(arguments)
+def _run(arguments: argparse.Namespace) -> int:
+    arguments.run(arguments)
     return 0
 
 
-def _bench_graph(arguments: argparse.Namespace) -> int:
+def _bench_graph(arguments: argparse.Namespace) -> None:
     # field checks of messages are for tests: they cost a fifth of the loop
     os.environ.pop("ROS_PYTHON_CHECK_FIELDS", None)
     mission = load_mission(arguments.mission, [f"mission.duration={arguments.duration}"])
-    measured: dict[str, list[FlightResult]] = {name: [] for name in _CONFIGURATIONS}
-    # kinds interleaved, so that a slow minute of the machine falls on all of them
-    for _ in range(arguments.repeats):
-        for name, (processes, recorded) in _CONFIGURATIONS.items():
-            result = _fly_once(mission, processes=processes, recorded=recorded)
-            if result.failure or result.interrupted:
-                complain(f"{name}: the flight failed:", result.failure or "interrupted")
-                return FAILED
-            measured[name].append(result)
+    with own_domain(mission, arguments.domain, None, console) as domain:
+        measured = _measure(mission, arguments.repeats)
     figures = {name: _figures(results) for name, results in measured.items()}
     table = ReadableTable()
     table.add_name("graph")
@@ -91,8 +85,21 @@ def _bench_graph(arguments: argparse.Namespace) -> int:
         )
     console.print(table)
     if arguments.json:
-        print_json(figures)
-    return 0
+        print_json({**figures, "domain": domain})
+
+
+def _measure(mission: Mission, repeats: int) -> dict[str, list[FlightResult]]:
+    measured: dict[str, list[FlightResult]] = {name: [] for name in _CONFIGURATIONS}
+    # kinds interleaved, so that a slow minute of the machine falls on all of them
+    for _ in range(repeats):
+        for name, (processes, recorded) in _CONFIGURATIONS.items():
+            result = _fly_once(mission, processes=processes, recorded=recorded)
+            if result.failure or result.interrupted:
+                raise MeasurementError(f"{name}: the flight failed: {result.failure or 'interrupted'}")
+            for note in result.notes:
+                complain(f"{name}: not as it should be:", note)
+            measured[name].append(result)
+    return measured
 
 
 def _fly_once(mission: Mission, *, processes: bool, recorded: bool) -> FlightResult:

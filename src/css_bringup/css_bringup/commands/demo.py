@@ -13,8 +13,9 @@ from pathlib import Path
 from css_bringup.commands.replay import print_replay
 from css_bringup.figures import print_figures
 from css_bringup.flight import default_bag
-from css_bringup.flying import fly
+from css_bringup.flying import fly, own_domain
 from css_bringup.options import (
+    add_domain_option,
     add_mission_options,
     add_output_options,
     complain,
@@ -25,7 +26,7 @@ from css_bringup.options import (
 )
 from css_bringup.replay import parse_request
 from css_bringup.replaying import replay
-from css_bringup.report import flight_object, print_json, print_result, unmet
+from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
@@ -38,6 +39,7 @@ _REPLAYED = ("ekf", "ekf:gyro=off", "wavg", "wavg:gyro=off")
 def _parser() -> CommandParser:
     parser = command_parser("css_bringup", "demo", __doc__, _EXAMPLES, _EXITS)
     add_mission_options(parser)
+    add_domain_option(parser)
     add_output_options(parser)
     parser.add_argument("--figures", type=Path, metavar="DIR", help="where figures go (default: beside the recording)")
     return parser
@@ -58,12 +60,14 @@ def _run(arguments: argparse.Namespace) -> int:
         f"nodes {', '.join(node.name for node in mission.nodes)}",
         soft_wrap=True,
     )
-    flight = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite)
+    with own_domain(mission, arguments.domain, bag, console) as domain:
+        flight = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite)
+    flight.domain = domain
     if flight.interrupted:
         errors.print(f"interrupted; the recording up to here is complete: {bag}", soft_wrap=True)
         return INTERRUPTED
     if flight.failure:
-        complain("the flight failed:", flight.failure)
+        print_incidents(flight)
         return FAILED
     log = read_flight(bag)
     flown = estimator_runs(log, [mission.values.graph.estimator])
@@ -76,12 +80,13 @@ def _run(arguments: argparse.Namespace) -> int:
     print_figures(log, folder)
     print_figures(replayed.log, folder / "replay")
     runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
-    if arguments.json:
-        print_json(flight_object(flight, runs))
     missed = unmet(flight, flown)
     for line in missed:
         complain("criterion missed:", line)
-    return FAILED if missed else 0
+    print_incidents(flight)
+    if arguments.json:
+        print_json(flight_object(flight, runs))
+    return FAILED if missed or flight.notes else 0
 
 
 if __name__ == "__main__":

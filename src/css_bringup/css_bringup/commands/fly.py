@@ -5,8 +5,9 @@ import argparse
 import sys
 
 from css_bringup.flight import FlightResult, default_bag
-from css_bringup.flying import fly
+from css_bringup.flying import fly, own_domain
 from css_bringup.options import (
+    add_domain_option,
     add_mission_options,
     add_output_options,
     complain,
@@ -15,7 +16,7 @@ from css_bringup.options import (
     guarded,
     mission_of,
 )
-from css_bringup.report import flight_object, print_json, print_result, unmet
+from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
 from css_common.mission import Mission
 from css_recording.errors import BagError
@@ -42,6 +43,7 @@ def _parser() -> CommandParser:
         help="pace against the wall clock (default factor 1.0)",
     )  # fmt: skip
     parser.add_argument("--no-record", action="store_true", help="fly without a recording and figures of merit")
+    add_domain_option(parser)
     add_output_options(parser)
     return parser
 
@@ -58,7 +60,9 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
-    result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+    with own_domain(mission, arguments.domain, bag, console) as domain:
+        result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+    result.domain = domain
     return conclude(mission, result, as_json=arguments.json)
 
 
@@ -75,18 +79,17 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
     for line in spin_lines(spinning) if spinning is not None else ():
         console.print(line, soft_wrap=True)
-    if result.failure:
-        complain("the flight failed:", result.failure)
     flown = not (result.failure or result.interrupted)
     missed = unmet(result, runs) if flown and result.bag is not None else []
     for line in missed:
         complain("criterion missed:", line)
+    print_incidents(result)
     if as_json:
         print_json(flight_object(result, runs) | ({} if spinning is None else {"spin": spin_object(spinning)}))
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED
-    return FAILED if result.failure or missed else 0
+    return FAILED if result.failure or result.notes or missed else 0
 
 
 if __name__ == "__main__":

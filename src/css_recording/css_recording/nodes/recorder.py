@@ -7,13 +7,14 @@ import re
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from rclpy.executors import Executor
 
-from css_common.command import CommandParser, command_parser, complain, guarded, positive
-from css_common.executor import create_executor, spin_until
+from css_common.command import FAILED, CommandParser, command_parser, complain, guarded, positive
+from css_common.executor import create_executor, retire, spin_until
 from css_common.mission import load_mission
 from css_common.mission_file import MissionError
 from css_common.stop_signal import StopSignal
@@ -22,7 +23,7 @@ from css_recording.bag_metadata import absolute
 from css_recording.errors import BagError
 from css_recording.process import RosArgumentsError, ros_process, split_arguments
 from css_recording.qos_overrides import read_qos_overrides
-from css_recording.recorder import RecorderNode
+from css_recording.recorder import INCIDENTS, RecorderNode
 from css_recording.recording_choice import Excluded, RecordingChoice
 from css_recording.split_bag_writer import FileLimits
 
@@ -69,12 +70,16 @@ def _run(parser: CommandParser, options: argparse.Namespace, for_ros: Sequence[s
     everything = options.all or not (options.mission or options.topic)
     with ros_process("recorder", for_ros):
         node = RecorderNode(
-            mission, folder, options.topic, everything=everything, overwrite=options.overwrite, choice=choice
+            mission,
+            folder,
+            options.topic,
+            everything=everything,
+            overwrite=options.overwrite,
+            in_flight=options.in_flight,
+            choice=choice,
         )
-        _record(node, folder, stop)
-        missing = _say(parser, options, node, folder)
-        node.destroy_node()
-    return 1 if node.failure or missing else 0
+        missing = _record(parser, options, node, folder, stop)
+    return FAILED if node.failure or missing else 0
 
 
 def _choice(options: argparse.Namespace) -> RecordingChoice:
@@ -87,7 +92,10 @@ def _choice(options: argparse.Namespace) -> RecordingChoice:
     return choice
 
 
-def _record(node: RecorderNode, folder: Path, stop: StopSignal) -> None:
+def _record(
+    parser: CommandParser, options: argparse.Namespace, node: RecorderNode, folder: Path, stop: StopSignal
+) -> list[str]:
+    """Records until told to end; topics that were named and never appeared."""
     executor = create_executor()
     executor.add_node(node)
     try:
@@ -95,8 +103,10 @@ def _record(node: RecorderNode, folder: Path, stop: StopSignal) -> None:
         spin_until(executor, lambda: stop.came or bool(node.failure))
         _drain(executor, node)
     finally:
-        node.close()
-        executor.remove_node(node)
+        node.close(_notes(options.notes, node))
+        missing = _say(parser, options, node, folder)
+        retire(executor, node)
+    return missing
 
 
 def _drain(executor: Executor, node: RecorderNode) -> None:
@@ -108,6 +118,15 @@ def _drain(executor: Executor, node: RecorderNode) -> None:
         quiet = time.monotonic() + _QUIET_S
         while time.monotonic() < quiet:
             executor.spin_once(timeout_sec=_QUIET_S / 10)
+
+
+def _notes(file: str | None, node: RecorderNode) -> dict[str, str]:
+    """What the flight was like, as its supervisor left it, and what the recorder itself lacks."""
+    lines = node.faults()
+    if file is not None:
+        with suppress(OSError):  # a supervisor that died leaves none
+            lines = [*json.loads(Path(file).read_text(encoding="utf-8")), *lines]
+    return {INCIDENTS: "\n".join(lines) or "none"}
 
 
 def _say(parser: CommandParser, options: argparse.Namespace, node: RecorderNode, folder: Path) -> list[str]:
@@ -131,6 +150,7 @@ def _figures(node: RecorderNode) -> dict[str, Any]:
         "recorded": node.counts,
         "counters": node.counters,
         "never_appeared": node.never_appeared,
+        "faults": node.faults(),
         "failure": node.failure,
         "cpu_s": time.process_time(),
     }
@@ -156,6 +176,7 @@ def _parser() -> CommandParser:
     parser = command_parser("css_recording", "recorder", _DESCRIPTION, _EXAMPLES, _EXITS, _NOTES)
     add = parser.add_argument
     add("--mission", metavar="NAME|FILE", help="record every topic that its graph publishes")
+    add("--in-flight", action="store_true", help="the mission is being flown and waits for this recorder")
     add("--set", metavar="KEY=VALUE", action="append", default=[], help="override a mission value; may be repeated")
     add("--topic", action="append", default=[], help="record this topic; may be repeated")
     add("--all", action="store_true", help="record every topic that appears (default without others)")
@@ -171,6 +192,7 @@ def _parser() -> CommandParser:
         "--qos-profile-overrides-path", metavar="FILE", type=Path,
         help="quality of service of topics, in rosbag2's YAML (default: the strictest that matches the publishers)",
     )  # fmt: skip
+    add("--notes", metavar="FILE", help="JSON list of lines to keep in the recording, read at its end")
     add("--summary", metavar="FILE", help="leave the figures of the recording in a JSON file")
     add("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser

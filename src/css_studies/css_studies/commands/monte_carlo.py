@@ -9,7 +9,6 @@ again, and ends with the same bytes. `fly MISSION --case K` flies one of the cas
 import argparse
 import itertools
 import json
-import os
 import re
 import signal
 import sys
@@ -19,6 +18,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from css_common import places
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
@@ -140,8 +140,7 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
 
 
 def _default_folder(mission: str) -> Path:
-    home = Path(os.environ.get("SUNPOINT_HOME", "."))
-    return home / "studies" / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
+    return places.results("studies") / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
 
 
 _COLUMNS = (

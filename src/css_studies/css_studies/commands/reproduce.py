@@ -3,7 +3,6 @@
 
 import argparse
 import json
-import os
 import signal
 import sys
 from collections.abc import Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
+from css_common import places
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import StudyError
@@ -54,7 +54,7 @@ def _run(options: argparse.Namespace) -> int:
     cases = (QUICK_CASES if options.quick else CASES) if options.cases is None else options.cases
     if not 1 <= cases <= 2**32:
         raise ReproductionError(f"--cases: {cases} given, expected 1 to {2**32}")
-    folder = options.out or Path(os.environ.get("SUNPOINT_HOME", "."), "reports", paper.name)
+    folder = options.out or places.results("reports") / paper.name
     folder.mkdir(parents=True, exist_ok=True)
     with progress_bar(Console(stderr=True)) as bar:
 
