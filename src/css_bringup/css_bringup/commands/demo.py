@@ -25,9 +25,10 @@ from css_bringup.options import (
     mission_of,
 )
 from css_bringup.replay import parse_request
-from css_bringup.replaying import replay
+from css_bringup.replaying import default_replay, replay
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
+from css_common.progress_lines import still_working
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
 
@@ -73,8 +74,9 @@ def _run(arguments: argparse.Namespace) -> int:
     flown = estimator_runs(log, [mission.values.graph.estimator])
     print_result(console, flight, flown)
     console.print("\nReplaying the recording through every Sun estimator, with gyro and without:")
-    copy = bag.with_name(f"{bag.name}_replay")
-    replayed = replay(bag, copy, mission, map(parse_request, _REPLAYED), {}, overwrite=arguments.overwrite)
+    copy = default_replay(bag, overwrite=arguments.overwrite)
+    with still_working(f"replaying {bag}"):
+        replayed = replay(bag, copy, mission, map(parse_request, _REPLAYED), {}, overwrite=arguments.overwrite)
     print_replay(replayed)
     folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
     print_figures(log, folder)

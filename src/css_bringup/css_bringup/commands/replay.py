@@ -13,10 +13,11 @@ from pathlib import Path
 from css_bringup.figures import print_figures
 from css_bringup.options import complain, console, guarded
 from css_bringup.replay import parse_request
-from css_bringup.replaying import ReplayResult, mission_of_bag, replay
+from css_bringup.replaying import ReplayResult, default_replay, mission_of_bag, replay
 from css_bringup.report import print_json
 from css_common.command import FAILED, CommandParser, command_parser
 from css_common.mission_file import MissionError
+from css_common.progress_lines import still_working
 from css_studies.flight_summary import summary_table
 
 _EXAMPLES = (
@@ -41,7 +42,7 @@ def _parser() -> CommandParser:
     parser.add_argument(
         "--remap", nargs="+", default=[], metavar="OLD:=NEW", help="topics of the recording under the graph's names"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="new recording (default: BAG_replay)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="new recording (default: BAG_replay, or _replay_2 ...)")
     parser.add_argument("--overwrite", action="store_true", help="replace a recording that is there")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="write figures of the comparison as PNG")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
@@ -59,10 +60,9 @@ def _run(arguments: argparse.Namespace) -> int:
     remap = dict(_remapping(item) for item in arguments.remap)
     requests = [parse_request(text) for text in arguments.estimators]
     mission = mission_of_bag(arguments.bag, remap, arguments.overrides, arguments.mission)
-    default = arguments.bag.with_name(f"{arguments.bag.stem if arguments.bag.is_file() else arguments.bag.name}_replay")
-    result = replay(
-        arguments.bag, arguments.out or default, mission, requests, remap, overwrite=arguments.overwrite
-    )
+    out = arguments.out or default_replay(arguments.bag, overwrite=arguments.overwrite)
+    with still_working(f"replaying {arguments.bag}"):
+        result = replay(arguments.bag, out, mission, requests, remap, overwrite=arguments.overwrite)
     print_replay(result)
     if arguments.figures:
         print_figures(result.log, arguments.figures)

@@ -5,7 +5,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from css_common.command import FAILED, USAGE, command_parser, complain
+from css_common.command import USAGE, command_parser, complain, guarded
+from css_common.progress_lines import still_working
 from css_recording.errors import BagError
 from css_recording.recovery import RecoveryReport, recover
 
@@ -26,11 +27,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="write the finished recording to this new folder, the torn one stays (default: mend it in place)",
     )  # fmt: skip
     options = parser.parse_args(arguments)
-    try:
-        report = recover(options.recording, options.output)
-    except BagError as error:
-        complain(parser.prog, error)
-        return FAILED if options.recording.exists() else USAGE
+    if not options.recording.exists():
+        complain(parser.prog, f"{options.recording}: there is no such recording")
+        return USAGE
+    return guarded(parser.prog, lambda: _run(options.recording, options.output), (), (BagError,))
+
+
+def _run(recording: Path, output: str | None) -> int:
+    with still_working(f"recovering {recording}"):
+        report = recover(recording, output)
     print(_summary(report))
     return 0
 

@@ -87,7 +87,7 @@ def _run(options: argparse.Namespace) -> int:
     messages = Console(stderr=True, highlight=False)
     begin = time.perf_counter()
     with progress_bar(messages) as bar:
-        task = bar.add_task(mission.name, total=None)
+        part = bar.add(mission.name)
         study = run_study(
             mission,
             configurations,
@@ -96,7 +96,7 @@ def _run(options: argparse.Namespace) -> int:
             first_case=options.first_case,
             sample_s=options.sample,
             threads=options.threads,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
+            progress=lambda done, total: bar.tell(part, done, total),
             scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
         )
     result = study_object(study, time.perf_counter() - begin, time.process_time())

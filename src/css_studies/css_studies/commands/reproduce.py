@@ -59,8 +59,8 @@ def _run(options: argparse.Namespace) -> int:
     with progress_bar(Console(stderr=True)) as bar:
 
         def progress(name: str) -> Progress:
-            task = bar.add_task(name, total=None)
-            return lambda done, total: bar.update(task, completed=done, total=total)
+            part = bar.add(name)
+            return lambda done, total: bar.tell(part, done, total)
 
         rows = paper.reproduce(Request(folder, cases, options.quick, progress))
     console = Console(highlight=False)
