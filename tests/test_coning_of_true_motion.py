@@ -7,7 +7,14 @@ import numpy as np
 import pytest
 from spinning import STEADY, motion_of, record_of, sun_angles, sun_over_andoya
 
-from css_estimation.coning import CHOICE_EVENTS, CHOICE_INERTIA, CHOICE_ONLY, analyse_coning, justification
+from css_estimation.coning import (
+    CHOICE_EVENTS,
+    CHOICE_INERTIA,
+    CHOICE_ONLY,
+    CHOICE_POWER,
+    analyse_coning,
+    justification,
+)
 from css_estimation.coning_angle import extremum_differences, fit_sine, max_min_angle
 from css_estimation.coning_spectrum import alias_frequencies, fourier_spectrum, peak_frequency, sequence_numbers
 from css_estimation.slit_angles import motion_gain
@@ -69,6 +76,28 @@ def test_a_given_inertia_ratio_chooses_the_true_frequency(frequency):
     assert coning.frequency == pytest.approx(frequency, abs=5e-3)
     assert coning.candidates[coning.chosen].inertia_ratio == pytest.approx(ratio, abs=2e-3)
     assert math.degrees(coning.full_angle) == pytest.approx(12.89, abs=0.02)
+
+
+def test_a_ratio_between_two_candidates_leaves_the_choice_to_the_pulses(up_leg):
+    passages = up_leg.passages.between(0.0, 40.0)
+    coning = analyse_coning(passages, INCLINATION, 1.0)  # aliases are at 0.700 and 1.301
+    assert (coning.choice, coning.chosen, coning.rivals) == (CHOICE_EVENTS, 1, ())
+
+
+def test_what_nothing_tells_apart_is_ambiguous_and_its_rivals_are_named(up_leg, monkeypatch):
+    monkeypatch.setattr("css_estimation.coning.fit_motion", lambda *arguments: None)
+    passages = up_leg.passages.between(0.0, 40.0)
+    near = analyse_coning(passages, INCLINATION, 0.72)
+    assert (near.choice, near.chosen, near.rivals) == (CHOICE_INERTIA, 1, ())
+    between = analyse_coning(passages, INCLINATION, 1.0)
+    assert (between.choice, between.chosen, between.rivals) == (CHOICE_INERTIA, 1, (2,))
+    assert "ambiguous, 0.1412 s may as well be: the given ratio of moments" in justification(between)
+    unknown = analyse_coning(passages, INCLINATION)
+    assert unknown.choice == CHOICE_POWER
+    assert sorted((unknown.chosen, *unknown.rivals)) == [0, 1, 2, 3]
+    powers = [candidate.power for candidate in unknown.candidates]
+    assert powers[unknown.chosen] == max(powers)
+    assert "the largest power is no proof; give the ratio" in justification(unknown)
 
 
 def test_the_papers_method_reads_too_little_for_two_reasons_with_numbers(up_leg, up_leg_coning):

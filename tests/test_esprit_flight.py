@@ -88,6 +88,7 @@ def test_a_recording_tells_spin_and_coning(flown):
     flight = read_spinning(bag)
     assert 35 < len(flight.passages.time) < 48
     assert flight.refused > 0
+    assert flight.reasons.total() == flight.refused
     told = spin_object(flight)
     assert told["legs"][0]["spin_hz"] == pytest.approx(6.0, rel=0.005)
     assert told["attitudes"] == len(flight.attitudes) > 30

@@ -23,17 +23,33 @@ def _executable(package: str, executable: str) -> Path:
     return path
 
 
-def _help(package: str, executable: str) -> str:
+def _help(package: str, executable: str, verb: str = "") -> str:
     command = [_executable(package, executable), "--help"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=False)
+    typed = {"SUNPOINT_VERB": f"{verb}:{executable}"} if verb else {}
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=100, check=False, env={**os.environ, **typed}
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 @pytest.mark.parametrize("verb", sorted(name for name, verb in VERBS.items() if verb.package))
-def test_verb_is_installed_and_explains_itself(verb):
+def test_verb_explains_itself_under_the_name_that_was_typed(verb):
     entry = VERBS[verb]
-    assert "usage" in _help(entry.package, entry.executable).lower()
+    told = _help(entry.package, entry.executable, verb)
+    lines = told.splitlines()
+    assert told.startswith(f"usage: ./sunpoint {verb} [-h]")
+    examples = lines[lines.index("examples:") + 1 : lines.index("exit codes:") - 1]
+    assert examples and all(line.startswith(f"  ./sunpoint {verb}") for line in examples)
+    codes = [line.split()[0] for line in lines[lines.index("exit codes:") + 1 :]]
+    assert codes == sorted(codes, key=int) and {"0", "2", "130"} <= set(codes)
+    assert max(map(len, lines)) <= 120
+
+
+@pytest.mark.parametrize(("verb", "executable"), [("record", "recorder"), ("import-csv", "import_csv")])
+def test_without_a_verb_the_name_is_that_of_ros2_run(verb, executable):
+    told = _help("css_recording", executable, f"{verb}x:other")
+    assert told.startswith(f"usage: ros2 run css_recording {executable} [-h]")
 
 
 @pytest.mark.parametrize(("package", "executable"), NODES)

@@ -79,7 +79,8 @@ def _start(project: Project, verb: str, arguments: list[str]) -> int:
     file = project.executable(package, executable)
     if not file.is_file():
         raise Refusal(f"package {package} has no executable {executable}")
-    return _replace_process([str(file), *arguments], env)
+    # the word that was typed, for the help and the errors of the program that it stands for
+    return _replace_process([str(file), *arguments], {**env, "SUNPOINT_VERB": f"{verb}:{executable}"})
 
 
 def _prepare(project: Project, ros: str, base: dict[str, str], with_tests: bool) -> State:

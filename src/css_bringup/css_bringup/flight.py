@@ -9,6 +9,7 @@ from pathlib import Path
 from css_bringup.incidents import lost_messages
 from css_common import places
 from css_common.mission import Mission
+from css_recording.bag_folder import free_name
 
 Progress = Callable[[float], None]
 """Called now and then with the simulated seconds flown."""
@@ -83,9 +84,4 @@ def default_bag(mission: Mission, folder: Path | None = None) -> Path:
     """A fresh recording folder `bags/MISSION_case_TIME`, in the project when there is one."""
     root = folder or places.results("bags")
     now = datetime.now(UTC).strftime("%Y%m%d_%H%M%S")
-    base = root / f"{mission.name}_{mission.values.mission.case}_{now}"
-    bag, n = base, 1
-    while bag.exists():
-        n += 1
-        bag = base.with_name(f"{base.name}_{n}")
-    return bag
+    return free_name(root / f"{mission.name}_{mission.values.mission.case}_{now}")

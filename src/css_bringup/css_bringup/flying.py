@@ -4,7 +4,7 @@
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from pathlib import Path
 
 from rich.console import Console
@@ -16,6 +16,7 @@ from css_bringup.flight import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
 from css_common import domains, network, places
 from css_common.mission import Mission
+from css_common.progress_lines import ProgressLines, still_working
 from css_common.stop_signal import StopSignal
 
 
@@ -75,7 +76,7 @@ def _fly_processes(
             print(note, file=sys.stderr, flush=True)
         named = len(supervisor.notes)
 
-    with console.status(escape(status)) if _live(console) else nullcontext():
+    with console.status(escape(status)) if _live(console) else still_working(f"flying {mission.name}"):
         return fly_processes(mission, bag, logs, name_restarts, lambda: stop.came, overwrite=overwrite)
 
 
@@ -83,8 +84,10 @@ def _fly_composed(
     mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
 ) -> FlightResult:
     with ComposedFlight(mission, bag, overwrite=overwrite) as flight:
+        total = mission.values.mission.duration
         if not _live(console):
-            return flight.fly(stopped=lambda: stop.came)
+            lines = ProgressLines(f"flying {mission.name}", "s simulated")
+            return flight.fly(lambda seconds: lines.tell(seconds, total), lambda: stop.came)
         bar = Progress(
             TextColumn(f"flying {escape(mission.name)}"),
             BarColumn(),
@@ -95,7 +98,7 @@ def _fly_composed(
             transient=True,
         )
         with bar:
-            task = bar.add_task("", total=mission.values.mission.duration)
+            task = bar.add_task("", total=total)
             return flight.fly(lambda seconds: bar.update(task, completed=seconds), lambda: stop.came)
 
 

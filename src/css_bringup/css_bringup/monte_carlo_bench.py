@@ -16,10 +16,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any, NamedTuple
 
-from rich import box
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
-from rich.text import Text
 
 from css_bringup.basilisk import LARGEST_ERROR_DEG, Basilisk
 from css_bringup.basilisk_scenario import basilisk_scenario, write_zonal_earth
@@ -28,6 +25,7 @@ from css_bringup.options import console, whole_number
 from css_bringup.processes import executable_path
 from css_bringup.report import print_json
 from css_common.mission import load_mission
+from css_studies.readable_table import ReadableTable
 
 MISSION = "okeefe_2013"
 KINDS = {"albedo": True, "no_albedo": False}
@@ -154,27 +152,23 @@ def figures(measured: Measured) -> dict[str, dict[str, float]]:
     return result
 
 
-def table(measured: Measured, version: str, arguments: argparse.Namespace) -> Table:
+def table(measured: Measured, version: str, arguments: argparse.Namespace) -> ReadableTable:
     """The figures for people."""
-    shown = Table(
-        title=f"CPU time of a step of a case, {MISSION}, {arguments.duration:g} s, medians of {arguments.repeats}",
-        title_justify="left",
-        box=box.SIMPLE_HEAD,
+    shown = ReadableTable(
+        f"CPU time of a step of a case, {MISSION}, {arguments.duration:g} s, medians of {arguments.repeats}"
     )
-    shown.add_column("", no_wrap=True)
+    shown.add_name()
     for heading in (
         f"Basilisk {version},\n{arguments.peer_estimator} [ns]", "heading\nerror [deg]",
         f"Sunpoint,\n{arguments.estimator} [ns]", "heading\nerror [deg]", "ratio",
     ):  # fmt: skip
-        shown.add_column(Text(heading), justify="right", no_wrap=True)
+        shown.add_number(heading)
     for kind, row in figures(measured).items():
         peer_error, our_error = (
             f"{median(one.heading_error_deg for one in measured[kind][side]):.2f}" for side in ("peer", "ours")
         )
-        shown.add_row(
-            kind.replace("_", " "), f"{row['peer_ns']:.0f}", peer_error, f"{row['ours_ns']:.0f}", our_error,
-            f"{row['ratio']:.0f}",
-        )  # fmt: skip
+        peer, ours, ratio = (f"{row[key]:.0f}" for key in ("peer_ns", "ours_ns", "ratio"))
+        shown.add_texts([kind.replace("_", " "), peer, peer_error, ours, our_error, ratio])
     return shown
 
 

@@ -2,13 +2,13 @@
 """Command-line options that several commands share, and the frame around every command."""
 
 import argparse
-import sys
 from collections.abc import Callable
 from pathlib import Path
 
 from rich.console import Console
 from rich.text import Text
 
+from css_common import command
 from css_common.domains import DomainError
 from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError
@@ -16,10 +16,6 @@ from css_common.network import NetworkError
 from css_common.schema import unknown_name
 from css_recording.errors import BagError
 from css_studies.flight_metrics import QUANTITIES
-
-FAILED = 1
-USAGE = 2
-INTERRUPTED = 130
 
 # without markup: units, paths and what people type may hold brackets
 console = Console(stderr=False, highlight=False, markup=False)
@@ -99,16 +95,12 @@ class FiguresError(Exception):
     """Figures that cannot be written, with the folder and the reason."""
 
 
-def guarded(command: Callable[[], int]) -> int:
-    """Runs a command; what the user got wrong becomes one line and exit code 2, Ctrl-C becomes 130."""
-    try:
-        return command()
-    except (MissionError, BagError, FiguresError, DomainError, NetworkError) as error:
-        complain("error:", error)
-        return USAGE
-    except KeyboardInterrupt:
-        errors.print("interrupted")
-        return INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()
-        return FAILED
+def guarded(prog: str, run: Callable[[], int], failed: tuple[type[Exception], ...] = ()) -> int:
+    """Runs a command; what the user got wrong becomes one line and exit code 2, Ctrl-C becomes 130.
+
+    Args:
+        prog: name of the command as its parser has it.
+        run: does the work and gives an exit code.
+        failed: errors that become one line and exit code 1.
+    """
+    return command.guarded(prog, run, (MissionError, BagError, FiguresError, DomainError, NetworkError), failed)

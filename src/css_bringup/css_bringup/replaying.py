@@ -14,6 +14,7 @@ from css_bringup.replay_verdict import shortcomings, software_apart
 from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
 from css_common.mission import Mission, default_mission, load_mission, mission_from_text
+from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.provenance import software_versions
@@ -85,6 +86,17 @@ class ReplayResult:
             "rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()},
             "missing_readings": {topic: dict(kinds) for topic, kinds in self.missing.items()},
         }
+
+
+def default_replay(source: Path, *, overwrite: bool = False) -> Path:
+    """Where the replay of a recording goes: `BAG_replay` beside it, with a number where that is taken.
+
+    Args:
+        source: rosbag2 folder or file.
+        overwrite: a replay that is there may be replaced.
+    """
+    base = source.with_name(f"{source.stem if source.is_file() else source.name}_replay")
+    return base if overwrite else free_name(base)
 
 
 def mission_of_bag(path: Path, remap: Mapping[str, str], overrides: Iterable[str], name: str | None) -> Mission:

@@ -13,7 +13,7 @@ from css_bringup.options import complain
 from css_common.mission import Mission
 from css_msgs.msg import ControlStatus
 from css_studies.flight_metrics import Run
-from css_studies.flight_summary import criteria_failures, summary_table
+from css_studies.flight_summary import Verdict, criteria_failures, criteria_verdicts, summary_table
 
 
 def result_object(
@@ -61,6 +61,8 @@ def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) ->
     """The table and the figures of the flight."""
     if runs:
         console.print(summary_table(runs))
+    for verdict in verdicts(result, runs):
+        console.print(verdict.line(), style="" if verdict.passed else "red", soft_wrap=True)
     simulated = f"{result.simulated_s:.1f} s simulated"
     if result.wall_s > 0.0:  # a plant that was killed took its times with it
         simulated += (
@@ -88,5 +90,16 @@ def print_json(value: Mapping[str, Any]) -> None:
 
 def unmet(result: FlightResult, runs: Sequence[Run]) -> list[str]:
     """Pass criteria of the mission that the flown estimator missed; in a flight without control, any estimator."""
+    return criteria_failures(result.mission.criteria, _judged(result, runs))
+
+
+def verdicts(result: FlightResult, runs: Sequence[Run]) -> list[Verdict]:
+    """What became of each pass criterion of a flight that came to its end."""
+    if result.failure or result.interrupted:
+        return []
+    return criteria_verdicts(result.mission.criteria, _judged(result, runs))
+
+
+def _judged(result: FlightResult, runs: Sequence[Run]) -> list[Run]:
     controlled = any(kind is ControlStatus for kind in result.mission.topics.values())
-    return criteria_failures(result.mission.criteria, [run for run in runs if run["flown"] or not controlled])
+    return [run for run in runs if run["flown"] or not controlled]

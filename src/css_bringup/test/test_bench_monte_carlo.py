@@ -18,7 +18,7 @@ from css_bringup.basilisk_scenario import basilisk_scenario, write_zonal_earth
 from css_bringup.commands import bench
 from css_bringup.json_process import MeasurementError, number, run_for_object
 from css_bringup.monte_carlo_bench import Measurement, figures, measure, our_measurement
-from css_bringup.options import FAILED, USAGE
+from css_common.command import FAILED, USAGE
 from css_common.mission import load_mission
 from css_environment.eclipse import conical_illumination
 from css_environment.reflectivity import read_reflectivity, zonal_reflectivity

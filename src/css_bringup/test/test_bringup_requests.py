@@ -12,10 +12,10 @@ from css_bringup import options
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
 from css_bringup.flight import FlightResult, default_bag
-from css_bringup.options import FAILED, USAGE
 from css_bringup.processes import Child, Supervisor
 from css_bringup.replay import parse_request
 from css_bringup.report import flight_object
+from css_common.command import FAILED, USAGE
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.flight_log import read_flight

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from css_common.codec import Sample
 from css_common.component import Component, Input
+from css_common.edge import HISTORY
 
 _MOST_PENDING = 2 * HISTORY  # more than the lead of the fastest topic over a node that was restarted
 _NEVER = -(2**63)

@@ -2,7 +2,8 @@
 """Coning of a spinning body from its passages through the slits: angle, period, all aliases and the choice of one.
 
 A candidate is chosen, in this order: because it is the only one; because it implies the ratio of moments of inertia
-that is given; because its torque-free motion explains the pulses and no other's does; by power, which is no proof.
+that is given and no other comes near it; because its torque-free motion explains the pulses and no other's does; by
+what is left, the nearer ratio or the larger power, which is no proof: the others stay its rivals.
 """
 
 from itertools import pairwise
@@ -24,7 +25,7 @@ CHOICE_POWER = 4
 SEGMENT = 15.0
 """Length of the windows [s] to which motions are fitted: so short that a slow drift is none."""
 
-_CLEARLY_BETTER = 0.5  # residual over that of the next candidate
+_CLEARLY_BETTER = 0.5  # residual, or distance from the given ratio, over that of the next candidate
 
 
 class Passages(NamedTuple):
@@ -57,6 +58,7 @@ class Coning(NamedTuple):
     residuals: tuple[float, ...]  # [s] of the motion of each candidate; -1: not fitted
     chosen: int
     choice: int
+    rivals: tuple[int, ...]  # candidates that the choice does not exclude
     max_min_angle: float  # [rad] full angle, as the paper has it
     sampled_angle: float  # [rad] what the paper's method makes of `sine` at the same times
     sine: Sine  # of the chosen candidate
@@ -105,13 +107,14 @@ def analyse_coning(passages: Passages, inclination: float, inertia_ratio: float 
     middle = 0.5 * (time[0] + time[-1])
     segment = passages.between(middle - 0.5 * SEGMENT, middle + 0.5 * SEGMENT)
     fits = [_motion(segment, inclination, candidate, spin, largest) for candidate in found]
-    chosen, choice = _chosen(found, fits, inertia_ratio)
+    chosen, choice, rivals = _chosen(found, fits, inertia_ratio)
     sine = fit_sine(time, angle, found[chosen].frequency)
     return Coning(
         candidates=tuple(found),
         residuals=tuple(-1.0 if fit is None else fit.residual for fit in fits),
         chosen=chosen,
         choice=choice,
+        rivals=rivals,
         max_min_angle=largest,
         sampled_angle=max_min_angle(sine.at(time - time[0])),
         sine=sine,
@@ -138,26 +141,40 @@ def justification(coning: Coning) -> str:
         )
     if coning.choice == CHOICE_ONLY:
         return f"the only frequency that a rigid body can have{fitted}"
+    if coning.rivals:
+        return f"{_ambiguity(coning)} (ratios of all candidates: {ratios}){fitted}"
     if coning.choice == CHOICE_INERTIA:
         return (
             f"implies a ratio of moments of inertia of {chosen.inertia_ratio:.3f}, nearest to the given one "
             f"(all: {ratios}){fitted}"
         )
-    if coning.choice == CHOICE_EVENTS:
-        return f"its torque-free motion explains the pulses{fitted}"
-    powers = ", ".join(f"{c.power:.4f}" for c in coning.candidates)
-    return f"the largest power of {powers}: no proof, give the ratio of moments of inertia (candidates: {ratios})"
+    return f"its torque-free motion explains the pulses{fitted}"
 
 
-def _chosen(found: list[Candidate], fits: list[MotionFit | None], inertia_ratio: float) -> tuple[int, int]:
+def _ambiguity(coning: Coning) -> str:
+    """That others are as good as what was chosen, which they are, and what would help."""
+    periods = ", ".join(f"{1.0 / coning.candidates[i].frequency:.4f} s" for i in coning.rivals)
+    if coning.choice == CHOICE_INERTIA:
+        return f"ambiguous, {periods} may as well be: the given ratio of moments of inertia lies between theirs"
+    return f"ambiguous, {periods} may as well be: the largest power is no proof; give the ratio of moments of inertia"
+
+
+def _chosen(
+    found: list[Candidate], fits: list[MotionFit | None], inertia_ratio: float
+) -> tuple[int, int, tuple[int, ...]]:
+    """Number of the candidate, why, and its rivals."""
     if len(found) == 1:
-        return 0, CHOICE_ONLY
+        return 0, CHOICE_ONLY, ()
+    left = list(range(len(found)))
+    best, choice = max(left, key=lambda i: found[i].power), CHOICE_POWER
     if inertia_ratio > 0.0:
-        return min(range(len(found)), key=lambda i: abs(found[i].inertia_ratio - inertia_ratio)), CHOICE_INERTIA
-    fitted = sorted((fit.residual, i) for i, fit in enumerate(fits) if fit is not None)
-    if len(fitted) > 1 and fitted[0][0] < _CLEARLY_BETTER * fitted[1][0]:
-        return fitted[0][1], CHOICE_EVENTS
-    return max(range(len(found)), key=lambda i: found[i].power), CHOICE_POWER
+        distance = [abs(candidate.inertia_ratio - inertia_ratio) for candidate in found]
+        best, choice = min(left, key=distance.__getitem__), CHOICE_INERTIA
+        left = [i for i in left if distance[best] >= _CLEARLY_BETTER * distance[i]]
+    fitted = sorted((fit.residual, i) for i in left if (fit := fits[i]) is not None)
+    if len(left) > 1 and len(fitted) > 1 and fitted[0][0] < _CLEARLY_BETTER * fitted[1][0]:
+        return fitted[0][1], CHOICE_EVENTS, ()
+    return best, choice, tuple(i for i in left if i != best)
 
 
 def _motion(

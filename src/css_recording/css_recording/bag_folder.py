@@ -15,7 +15,11 @@ from css_recording.errors import BagError
 
 def fresh_folder(name: str) -> Path:
     """A folder `bags/NAME_TIME` that does not exist yet, in the project when there is one."""
-    base = places.results("bags") / f"{name}_{datetime.now(UTC):%Y%m%d_%H%M%S}"
+    return free_name(places.results("bags") / f"{name}_{datetime.now(UTC):%Y%m%d_%H%M%S}")
+
+
+def free_name(base: Path) -> Path:
+    """This path, or the same with a number where something has that name."""
     folder, number = base, 1
     while folder.exists():
         number += 1

@@ -53,6 +53,11 @@ class BagReader:
         ]
 
     @property
+    def name(self) -> str:
+        """What to call it in a message."""
+        return str(self.path)
+
+    @property
     def topics(self) -> list[TopicCount]:
         """Topics in the order of the recording."""
         return list(self._topics)

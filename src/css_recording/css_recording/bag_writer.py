@@ -34,7 +34,7 @@ from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
 METADATA_RECORD = "sunpoint"
 FLIGHT_RECORD = "sunpoint_flight"
 """Texts known at the end of a flight; `metadata.yaml` has them too, as `custom_data`."""
-_ROS_DISTRO = "jazzy"  # where no ROS is sourced
+ROS_DISTRO = "jazzy"  # where no ROS is sourced
 
 
 class BagWriter:
@@ -178,7 +178,11 @@ class BagWriter:
         self.flush()
         if notes:
             self.add_metadata(FLIGHT_RECORD, notes)
-        distro = os.environ.get("ROS_DISTRO", _ROS_DISTRO)
+        self._finish()
+
+    def _finish(self) -> None:
+        """Write what stands at the end of a recording."""
+        distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
         summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro, self._notes)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         with self._disk():

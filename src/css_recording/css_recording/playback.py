@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a recording is to be played, and what became of it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+from rclpy.qos import QoSProfile
 
 
 class PlaybackError(Exception):
@@ -20,6 +23,9 @@ class PlaybackOptions:
         clock: publish the recorded time on /clock.
         start, end: span to play [s] after the first message.
         topics: only these; None: all.
+        paused: begin held.
+        loop: begin again at the end, with the same stamps.
+        qos: quality of service of topics that are not to have the strongest.
     """
 
     rate: float = 1.0
@@ -30,6 +36,9 @@ class PlaybackOptions:
     start: float = 0.0
     end: float | None = None
     topics: tuple[str, ...] | None = None
+    paused: bool = False
+    loop: bool = False
+    qos: Mapping[str, QoSProfile] = field(default_factory=dict)
 
 
 @dataclass
@@ -41,9 +50,11 @@ class PlaybackReport:
         left_to_live_nodes: topics that were not published because a live node publishes them.
         not_installed: topics whose type is not known here.
         stamps: different stamps played.
+        stopped: it was ended before its end.
     """
 
     published: dict[str, int] = field(default_factory=dict)
     left_to_live_nodes: list[str] = field(default_factory=list)
     not_installed: list[str] = field(default_factory=list)
     stamps: int = 0
+    stopped: bool = False

@@ -3,7 +3,7 @@
 
 What a live node publishes is left to it. Messages go out as the bytes that were recorded, with the stamps that
 they have. Lockstep is the reproducible way: all messages of one stamp are published, and the next follow when every
-awaited topic has answered that stamp.
+awaited topic has answered that stamp. A playback can be held, stepped and made faster or slower while it lasts.
 """
 
 import time
@@ -23,9 +23,13 @@ from rosgraph_msgs.msg import Clock
 from css_common.codec import stamp_of
 from css_common.diagnostics import Diagnostics, Health
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION, matching_qos
-from css_recording.bag_reader import BagMessage, BagReader
+from css_recording.bag_reader import BagMessage
 from css_recording.errors import BagError
+from css_recording.merged_bags import Recording
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
+from css_recording.playback_choice import choose
+from css_recording.playback_pace import PlaybackPace
+from css_recording.player_controls import PlayerControls
 from css_recording.ros_topics import message_class_of, publishers_of_others
 
 _SETTLED_AFTER = 2.0
@@ -36,11 +40,17 @@ _SPIN = 0.05
 
 
 class PlayerNode(Node):
-    """Plays one recording."""
+    """Plays a recording.
+
+    Attributes:
+        report: what has been played.
+        pace: when what is due.
+        controls: hold, step, rate.
+    """
 
     def __init__(
         self,
-        reader: BagReader,
+        reader: Recording,
         options: PlaybackOptions,
         *,
         context: Context | None = None,
@@ -50,36 +60,34 @@ class PlayerNode(Node):
         """Prepares playback; `play` does it.
 
         Args:
-            reader: the recording.
+            reader: the recording, or several.
             options: how to play it.
             context: ROS context.
             use_global_arguments: False in a process of several nodes, where one command line serves them all.
             now: wall clock [s] that paces the playback.
 
         Raises:
-            BagError: the recording lacks a topic that the options name.
+            BagError: nothing in the recording is what the options ask for.
         """
         super().__init__("player", context=context, use_global_arguments=use_global_arguments)
         self.report = PlaybackReport()
         self._reader = reader
         self._options = options
+        self._now = now
+        self.pace = PlaybackPace(options.rate, now, paused=options.paused)
+        try:
+            self._choice = choose(reader, options, self.resolve_topic_name)
+            self.controls = PlayerControls(self, self.pace)
+        except (BagError, ValueError) as error:
+            self.destroy_node()
+            raise BagError(str(error)) from error
         self._diagnostics = Diagnostics(self, self.health)
-        counts = {entry.topic.name: entry.count for entry in reader.topics}
-        chosen = counts if options.topics is None else [self.resolve_topic_name(name) for name in options.topics]
-        unknown = [name for name in chosen if name not in counts]
-        if unknown:
-            raise BagError(f"{reader.path}: no topic {unknown[0]}")
-        self._topics = [entry.topic for entry in reader.topics if entry.topic.name in chosen]
         self._publishers_by_topic: dict[str, Publisher] = {}
         self._answered: dict[str, int] = {}
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if options.clock else None
-        pace = self.resolve_topic_name(options.pace) if options.pace else None
-        self._pace = pace or max(chosen, key=lambda name: counts[name], default="")
-        if self._pace not in chosen:
-            raise BagError(f"{reader.path}: no topic {self._pace} to pace the playback")
-        self._now = now
         self._executor: Executor | None = None
         self._stopped: Callable[[], bool] = lambda: False
+        self._listen: Callable[[], None] = lambda: None
 
     def health(self) -> Health:
         """Level, one line and counters for /diagnostics."""
@@ -89,25 +97,33 @@ class PlayerNode(Node):
             return Health(DiagnosticStatus.WARN, message, counters, 0)
         return Health(DiagnosticStatus.OK, "playing", counters, 0)
 
-    def play(self, executor: Executor, stopped: Callable[[], bool] = lambda: False) -> PlaybackReport:
-        """Plays the recording once; returns early when `stopped`.
+    def play(
+        self,
+        executor: Executor,
+        stopped: Callable[[], bool] = lambda: False,
+        listen: Callable[[], None] = lambda: None,
+    ) -> PlaybackReport:
+        """Plays the recording, once or again and again; returns early when `stopped`.
 
         Args:
             executor: runs this node, and any others of the process.
             stopped: asked again and again.
+            listen: called as often, to look for what the user wants.
 
         Raises:
-            PlaybackError: a node that should answer is absent or silent.
+            PlaybackError: a node that should answer is absent or silent, or nothing is left to play.
             BagError: the recording cannot be read.
         """
-        self._executor, self._stopped = executor, stopped
-        if not self._publishers_by_topic:
-            self._settle()
-            self._create_publishers()
-            self._meet_partners()
+        self._executor, self._stopped, self._listen = executor, stopped, listen
+        self._settle()
+        self._create_publishers()
+        self._meet_partners()
         self._publish_all()
+        while self._options.loop and self._publishers_by_topic and not self._stopped():
+            self._publish_all()
         for publisher in self._publishers_by_topic.values():
             publisher.wait_for_all_acked(Duration(seconds=2))
+        self.report.stopped = self._stopped()
         return self.report
 
     # Before the first message
@@ -117,7 +133,7 @@ class PlayerNode(Node):
         before: object = None
         quiet_since = began = time.monotonic()
         while not self._stopped() and time.monotonic() - began < _SETTLE_LIMIT:
-            now = [(topic.name, len(publishers_of_others(self, topic.name))) for topic in self._topics]
+            now = [(topic.name, len(publishers_of_others(self, topic.name))) for topic in self._choice.topics]
             graph = (now, sorted(self.get_node_names()))
             if graph != before:
                 before, quiet_since = graph, time.monotonic()
@@ -126,7 +142,7 @@ class PlayerNode(Node):
             self._spin(_SPIN)
 
     def _create_publishers(self) -> None:
-        for topic in self._topics:
+        for topic in self._choice.topics:
             if publishers_of_others(self, topic.name):
                 self.report.left_to_live_nodes.append(topic.name)
                 self.get_logger().info(f"{topic.name} is left to the node that publishes it")
@@ -138,8 +154,18 @@ class PlayerNode(Node):
                 self.get_logger().warning(f"{topic.name} is not played: {error}")
                 continue
             # The strongest offer, whatever was recorded: a node that asks for less is matched all the same.
-            self._publishers_by_topic[topic.name] = self.create_publisher(message_class, topic.name, LOOP_PUBLISHER)
+            qos = self._options.qos.get(topic.name, LOOP_PUBLISHER)
+            self._publishers_by_topic[topic.name] = self.create_publisher(message_class, topic.name, qos)
             self.report.published[topic.name] = 0
+        if not self._publishers_by_topic and not self._stopped():
+            raise PlaybackError(f"nothing to play: {self._why_not()}")
+
+    def _why_not(self) -> str:
+        reasons = {
+            "left to the nodes that publish them": self.report.left_to_live_nodes,
+            "of types that are not installed": self.report.not_installed,
+        }
+        return "; ".join(f"{', '.join(topics)} {reason}" for reason, topics in reasons.items() if topics)
 
     def _meet_partners(self) -> None:
         for name in self._options.wait_for:
@@ -186,26 +212,34 @@ class PlayerNode(Node):
 
     def _publish_all(self) -> None:
         self._answered = dict.fromkeys(self._answered, -1)
-        start_ns = self._reader.start_ns + round(self._options.start * 1e9)
-        began = looked = self._now()
-        for stamp_ns, messages in self._by_stamp(start_ns):
-            due = began + (stamp_ns - start_ns) * 1e-9 / self._options.rate
-            self._spin(0.0)  # also when it is late: nodes of this process must get their turn
-            while not self._stopped() and self._now() < due:
-                self._spin(min(_SPIN, max(0.0, due - self._now())))
-            if self._stopped():
+        self.pace.start(self._choice.start_ns)
+        looked = self._now()
+        for stamp_ns, messages in self._by_stamp():
+            if not self._await_turn(stamp_ns):
                 return
             if self._now() - looked > _LOOK_EVERY:
                 looked = self._now()
                 self._give_way()
             paced = self._publish_group(stamp_ns, messages)
+            self.pace.stamp_is_over()
             if paced and self._answered:
                 self._await_answers(stamp_ns)
 
-    def _by_stamp(self, start_ns: int) -> Iterator[tuple[int, Iterable[BagMessage]]]:
-        end_ns = None if self._options.end is None else self._reader.start_ns + round(self._options.end * 1e9)
-        played = [*self._publishers_by_topic, *([self._pace] if self._answered else [])]
-        return groupby(self._reader.messages(set(played), start_ns, end_ns), key=attrgetter("stamp_ns"))
+    def _await_turn(self, stamp_ns: int) -> bool:
+        """Waits until the next message, of this stamp, is due; False when the playback is to end instead."""
+        self._spin(0.0)  # also when it is late: nodes of this process must get their turn
+        while not self._stopped():
+            wait = self.pace.wait(stamp_ns)
+            if wait <= 0.0:
+                return True
+            self._spin(min(_SPIN, wait))
+        return False
+
+    def _by_stamp(self) -> Iterator[tuple[int, Iterable[BagMessage]]]:
+        played = [*self._publishers_by_topic, *([self._choice.pacing] if self._answered else [])]
+        choice = self._choice
+        messages = self._reader.messages(set(played), choice.start_ns, choice.end_ns)
+        return groupby(messages, key=attrgetter("stamp_ns"))
 
     def _publish_group(self, stamp_ns: int, messages: Iterable[BagMessage]) -> bool:
         """Publishes the messages of one stamp; whether the pacing topic was among them."""
@@ -213,15 +247,24 @@ class PlayerNode(Node):
         for message in messages:
             publisher = self._publishers_by_topic.get(message.topic)
             if publisher is not None:
+                if self.pace.paused and not self._step(stamp_ns):
+                    return False
                 publisher.publish(message.data)
                 self.report.published[message.topic] += 1
-            paced = paced or message.topic == self._pace
+            paced = paced or message.topic == self._choice.pacing
         if self._clock_publisher is not None:
             now = Clock()
             now.clock.sec, now.clock.nanosec = divmod(stamp_ns, 1_000_000_000)
             self._clock_publisher.publish(now)
         self.report.stamps += 1
         return paced
+
+    def _step(self, stamp_ns: int) -> bool:
+        """Waits, held, until one message is granted or all go on; False when the playback is to end instead."""
+        due = self._await_turn(stamp_ns)
+        if self.pace.paused:
+            self.pace.played(stamp_ns)
+        return due
 
     def _give_way(self) -> None:
         """Stops publishing what a live node has begun to publish."""
@@ -255,3 +298,4 @@ class PlayerNode(Node):
     def _spin(self, seconds: float) -> None:
         assert self._executor is not None
         self._executor.spin_once(timeout_sec=seconds)
+        self._listen()

@@ -1,7 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line of a process that is also a node."""
+"""What a process that is also a node does with its command line and with ROS."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+import rclpy
+from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
+from rclpy.signals import SignalHandlerOptions
+
+
+class RosArgumentsError(Exception):
+    """What was given to ROS cannot be understood. The text is one line."""
 
 
 def split_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
@@ -11,3 +20,27 @@ def split_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
     """
     at = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
     return list(arguments[:at]), list(arguments[at:])
+
+
+@contextmanager
+def ros_process(name: str, for_ros: Sequence[str]) -> Iterator[None]:
+    """ROS, while the context lasts.
+
+    Signals stay with the command: rclpy would shut its context down with messages still waiting to be taken.
+
+    Args:
+        name: of the program, for ROS.
+        for_ros: arguments from `--ros-args` on.
+
+    Raises:
+        RosArgumentsError: they are wrong.
+    """
+    try:
+        rclpy.init(args=[name, *for_ros], signal_handler_options=SignalHandlerOptions.NO)
+    except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+        reason = str(error).splitlines()[0].removeprefix("failed to initialize rcl: ").split(", at /")[0]
+        raise RosArgumentsError(f"{' '.join(for_ros)}: {reason}") from error
+    try:
+        yield
+    finally:
+        rclpy.try_shutdown()

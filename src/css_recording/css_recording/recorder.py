@@ -31,13 +31,14 @@ from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION, matching_qos
 from css_common.sole_subscription import SoleSubscription
 from css_common.writers import writer_choice
 from css_recording.bag_metadata import Topic, absolute
-from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.flight_pacing import FlightPacing
 from css_recording.flight_recorder import FlightRecorder, Gap
 from css_recording.provenance import software_versions
+from css_recording.recording_choice import RecordingChoice
 from css_recording.ros_topics import message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
+from css_recording.split_bag_writer import SplitBagWriter
 
 PARAMETER_EVENTS = "/parameter_events"
 INCIDENTS = "incidents"
@@ -70,6 +71,7 @@ class RecorderNode(Node):
         everything: bool = False,
         overwrite: bool = False,
         in_flight: bool = False,
+        choice: RecordingChoice | None = None,
         context: Context | None = None,
         use_global_arguments: bool = True,
     ) -> None:
@@ -82,6 +84,7 @@ class RecorderNode(Node):
             everything: also every topic that appears.
             overwrite: replace a recording that is there.
             in_flight: the mission is being flown and waits for this recorder; only nodes of its graph are recorded.
+            choice: what is left out, quality of service, files; default: nothing, the strictest, one.
             context: ROS context.
             use_global_arguments: False in a composed process, where one command line serves many nodes.
 
@@ -91,6 +94,7 @@ class RecorderNode(Node):
         super().__init__("recorder", context=context, use_global_arguments=use_global_arguments)
         self.failure = ""
         self._everything = everything
+        self._choice = choice or RecordingChoice()
         self._expected: dict[str, type | None] = {}
         self._last: set[str] = set()
         self._discovered: set[str] = set()
@@ -118,6 +122,11 @@ class RecorderNode(Node):
     def ready(self) -> bool:
         """Every expected topic is subscribed and has a publisher."""
         return not self._missing(self._expected)
+
+    @property
+    def never_appeared(self) -> list[str]:
+        """Expected topics that nobody has published, or that cannot be recorded."""
+        return sorted(topic for topic in self._expected if topic not in self._subscribed)
 
     @property
     def counts(self) -> dict[str, int]:
@@ -193,16 +202,21 @@ class RecorderNode(Node):
             limits = BufferLimits(hold_back_ns=max(SECOND_NS // 5, 2 * mission.period_ns))
             for name, output in mission.outputs.items():
                 topic = self.resolve_topic_name(name)
+                if topic in self._choice.excluded:
+                    continue
                 self._expected[topic] = output.message_type
                 self._names[topic] = name
                 if not output.events:
                     spacing_ns[topic] = output.divider * mission.period_ns
                 recorded.append(Topic(topic, type_name(output.message_type), (recorded_qos(LOOP_PUBLISHER),)))
             if mission.plant is not None:
-                self._last = {self.resolve_topic_name(output.topic) for output in mission.plant.outputs}
+                plant = (self.resolve_topic_name(output.topic) for output in mission.plant.outputs)
+                self._last = {topic for topic in plant if topic in self._expected}
         events = (recorded_qos(qos_profile_parameter_events),)
         recorded.append(Topic(PARAMETER_EVENTS, type_name(ParameterEvent), events))
-        return FlightRecorder(BagWriter(bag, recorded, metadata, overwrite=overwrite, limits=limits), spacing_ns)
+        files = self._choice.limits
+        writer = SplitBagWriter(bag, recorded, metadata, files=files, overwrite=overwrite, limits=limits)
+        return FlightRecorder(writer, spacing_ns)
 
     def _watch_parameters(self) -> None:
         self.create_subscription(
@@ -237,7 +251,7 @@ class RecorderNode(Node):
 
     def _discover(self) -> None:
         for topic, types in self.get_topic_names_and_types():
-            known = topic in self._expected or topic in _LEFT_OUT
+            known = topic in self._expected or topic in _LEFT_OUT or topic in self._choice.excluded
             if not known and "/_" not in topic and len(types) == 1:
                 self._discovered.add(topic)
 
@@ -278,13 +292,14 @@ class RecorderNode(Node):
 
     def _listen(self, topic: str, message_type: type, offered: QoSProfile) -> Subscription | SoleSubscription:
         take = partial(self._take, topic)
+        asked = self._choice.qos.get(topic)
         if self._mission is None or topic not in self._names:
             # whose topic it is nobody knows, and some have many writers
-            return self.create_subscription(message_type, topic, take, offered, raw=True)
+            return self.create_subscription(message_type, topic, take, asked or offered, raw=True)
         choice = writer_choice(
             self._mission, self._names[topic], self.get_namespace(), only=self._in_flight or None
         )
-        qos = RECORDER_SUBSCRIPTION if self._in_flight else offered  # not what a stranger offers
+        qos = asked or (RECORDER_SUBSCRIPTION if self._in_flight else offered)  # not what a stranger offers
         hand_over = partial(self._recorder.hand_over, topic)
         return SoleSubscription(self, message_type, topic, take, qos, choice, on_hand_over=hand_over)
 

@@ -185,11 +185,11 @@ def test_player_process_loops_until_told_to_end(flight, tmp_path, graph):
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["nowhere"], 1, "no such recording"),
+        (["nowhere"], 2, "no such recording"),
         (["bag", "--remap", "a"], 2, "expected OLD:=NEW"),
-        (["bag", "--remap", "a:=b"], 1, "no topic /a to rename"),
+        (["bag", "--remap", "a:=b"], 2, "no topic /a to rename"),
         (["bag", "--rate", "-1"], 2, "--rate"),
-        ([], 2, "usage"),
+        ([], 2, "required: recording"),
     ],
 )
 def test_command_says_what_is_wrong(flight, tmp_path, monkeypatch, capsys, arguments, code, words):

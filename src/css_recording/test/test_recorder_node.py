@@ -18,6 +18,7 @@ from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
 from css_recording.nodes import recorder as command
 from css_recording.recorder import RecorderNode
+from css_recording.recording_choice import Excluded, RecordingChoice
 
 BEST_EFFORT = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT, durability=DurabilityPolicy.VOLATILE)
 
@@ -178,12 +179,18 @@ def test_recorder_process_finishes_its_recording_when_told_to_end(flight, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "code", "words"),
     [
-        (["-o", "bag"], 1, "not empty"),
+        (["-o", "bag"], 2, "not empty"),
         (["--mission", "nowhere.yaml"], 2, "no such mission"),
-        (["--nonsense"], 2, "usage"),
+        (["--nonsense"], 2, "unrecognized arguments: --nonsense"),
+        (["-o", "b", "--exclude", "("], 2, "--exclude (: is neither a topic nor a regular expression"),
+        (["-o", "b", "--topic", "a", "--exclude", "^/a"], 2, "--topic a: is excluded by --exclude"),
+        (["-o", "b", "--max-bag-size", "0"], 2, "--max-bag-size: 0 given, expected bytes from 1 on"),
+        (["-o", "b", "--max-bag-duration", "nan"], 2, "--max-bag-duration: nan given, expected a number above 0"),
+        (["-o", "b", "--qos-profile-overrides-path", "q.yaml"], 2, "q.yaml: cannot be read"),
+        (["-o", "b", "--topic", "nobody"], 1, "/nobody was named with --topic and never appeared"),
     ],
 )
-def test_command_says_what_is_wrong(flight, tmp_path, monkeypatch, capsys, arguments, code, words):
+def test_command_says_what_is_wrong(flight, tmp_path, monkeypatch, capfd, arguments, code, words):
     flight.record(tmp_path / "bag", 1)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(command, "StopSignal", lambda: SimpleNamespace(came=True))
@@ -191,4 +198,78 @@ def test_command_says_what_is_wrong(flight, tmp_path, monkeypatch, capsys, argum
         assert command.main(arguments) == code
     except SystemExit as exit_info:
         assert exit_info.code == code
-    assert words in capsys.readouterr().err
+    said = capfd.readouterr().err
+    assert words in said
+    assert said.count("recorder: error: ") == 1
+
+
+def test_what_is_excluded_is_left_out(flight, tmp_path, graph):
+    choice = RecordingChoice(Excluded(["gyro/imu", "^/debug/"]))
+    recorder = record(graph, tmp_path / "bag", everything=True, choice=choice)
+    node = graph.node("driver")
+    names = ("css/voltages", "gyro/imu", "gyro/imu_raw", "debug/voltages", "own/debug/voltages")
+    publishers = {name: node.create_publisher(CssVoltages, name, LOOP_PUBLISHER) for name in names}
+    wanted = {"css/voltages", "gyro/imu_raw", "own/debug/voltages"}
+    graph.spin_until(lambda: all(publishers[name].get_subscription_count() for name in wanted))
+    for publisher in publishers.values():
+        publisher.publish(voltages_of(flight, 1)[0][2])
+    graph.spin_until(lambda: recorder.message_count == 3)
+    recorder.close()
+    assert {topic for topic, _, _ in contents(tmp_path / "bag")} == {f"/{name}" for name in wanted}
+
+
+def test_a_mission_is_recorded_without_what_is_excluded(tmp_path, graph):
+    from css_common.mission import default_mission
+
+    mission = default_mission()
+    recorder = graph.add(
+        RecorderNode(mission, tmp_path / "bag", choice=RecordingChoice(Excluded(["truth"])), **graph.options)
+    )
+    recorder.close()
+    assert sorted(recorder.never_appeared) == sorted(f"/{topic}" for topic in mission.outputs if topic != "truth")
+    with BagReader(tmp_path / "bag") as reader:
+        assert "/truth" not in {entry.topic.name for entry in reader.topics}
+
+
+def test_quality_of_service_is_what_the_user_says(tmp_path, graph):
+    # what is offered is reliable; the recorder asks for less
+    recorder = record(
+        graph, tmp_path / "bag", "css/voltages", choice=RecordingChoice(qos={"/css/voltages": BEST_EFFORT})
+    )
+    node = graph.node("driver")
+    node.create_publisher(CssVoltages, "css/voltages", LOOP_PUBLISHER)
+    graph.spin_until(lambda: recorder.ready and bool(node.get_subscriptions_info_by_topic("/css/voltages")))
+    (endpoint,) = node.get_subscriptions_info_by_topic("/css/voltages")
+    assert endpoint.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+    recorder.close()
+
+
+def test_command_splits_and_says_what_never_came(flight, tmp_path, graph):
+    folder = tmp_path / "bag"
+    arguments = ["--topic", "css/voltages", "--topic", "nobody", "-o", str(folder), "--max-bag-duration", "3", "--json"]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "css_recording.nodes.recorder", *arguments],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        publisher = graph.node("driver").create_publisher(CssVoltages, "css/voltages", LOOP_PUBLISHER)
+        graph.spin_until(lambda: publisher.get_subscription_count() == 1)
+        for _, _, data in voltages_of(flight, 80):
+            publisher.publish(data)
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=30)
+    finally:
+        process.kill()
+    assert process.returncode == 1
+    assert errors.splitlines()[-1] == "recorder: error: /nobody was named with --topic and never appeared"
+    result = json.loads(output.splitlines()[-1])
+    assert result["never_appeared"] == ["/nobody"]
+    assert result["recorded"]["/css/voltages"] == 80
+    assert sorted(path.name for path in folder.glob("*.mcap")) == ["bag_0.mcap", "bag_1.mcap", "bag_2.mcap"]
+    assert contents(folder) == voltages_of(flight, 80)
+
+
+def test_a_recording_of_nothing_says_so(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(command, "StopSignal", lambda: SimpleNamespace(came=True))
+    assert command.main(["-o", str(tmp_path / "bag"), "--exclude", "."]) == 0
+    assert f"{tmp_path}/bag: no messages" in capfd.readouterr().out

@@ -257,7 +257,7 @@ def test_command_reports_and_exits_as_it_says(small, tmp_path, capsys):
     assert "lost: the last" in printed
     assert main([str(folder)]) == 0
     assert "was complete, 52 messages" in capsys.readouterr().out
-    assert main([str(tmp_path / "nowhere")]) == 1
+    assert main([str(tmp_path / "nowhere")]) == 2
     assert "no such recording" in capsys.readouterr().err
     with pytest.raises(SystemExit) as exit_info:
         main([])

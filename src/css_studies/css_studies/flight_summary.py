@@ -2,15 +2,13 @@
 """What people read of the runs of a flight: a table, and the mission's pass criteria that they miss."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TextIO
+from typing import NamedTuple, TextIO
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from css_common.schema import unknown_name
 from css_studies.flight_metrics import QUANTITIES, Run
+from css_studies.readable_table import ReadableTable
 
 _COLUMNS = {
     "power_positive_s": ("con-\nverging\n[s]", "{:.1f}"),
@@ -25,25 +23,24 @@ _COLUMNS = {
 }
 
 
-def summary_table(runs: Iterable[Run], title: str = "") -> Table:
+def summary_table(runs: Iterable[Run], title: str = "") -> ReadableTable:
     """The runs as a table for a `rich` console; what is unknown or was never reached is a dash.
 
-    It fits into 80 columns, which is what a console has that is no terminal.
+    It fits into 80 columns, which is what a console has that is no terminal; in fewer each run is a block of lines.
     """
     runs = list(runs)
-    table = Table(title=title or None, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    table.add_column("estimator", no_wrap=True)
-    table.add_column("gyro")
+    table = ReadableTable(title or None)
+    table.add_name("estimator")
+    table.add_number("gyro")
     columns = _columns_of(runs)
     for heading, _ in columns.values():
-        # as Text, because markup would take a unit for a style
-        table.add_column(Text(heading), justify="right")
+        table.add_number(heading)
     for run in runs:
         shown = []
         for quantity, (_, text) in columns.items():
             value = run[quantity]
             shown.append("-" if value is None else text.format(value))
-        table.add_row(Text(run["estimator"] + (" (flown)" if run["flown"] else "")), run["gyro"], *shown)
+        table.add_texts([run["estimator"] + (" (flown)" if run["flown"] else ""), run["gyro"], *shown])
     return table
 
 
@@ -59,6 +56,44 @@ def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = No
     Console(file=file, highlight=False).print(summary_table(runs, title))
 
 
+class Verdict(NamedTuple):
+    """What became of one limit of one criterion."""
+
+    estimator: str
+    quantity: str
+    value: float | None  # None: it has none
+    bound: str  # "min" or "max"
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the criterion is met; a quantity without a value meets none."""
+        if self.value is None:
+            return False
+        return self.value >= self.limit if self.bound == "min" else self.value <= self.limit
+
+    def line(self) -> str:
+        """PASS or FAIL, and why."""
+        word = "PASS" if self.passed else "FAIL"
+        value = "no value" if self.value is None else f"{self.value:.6g}"
+        relation = "at least" if self.bound == "min" else "at most"
+        return f"{word}  {self.quantity} {value}, must be {relation} {self.limit:g}  ({self.estimator})"
+
+
+def criteria_verdicts(criteria: Mapping[str, Mapping[str, float]], runs: Iterable[Run]) -> list[Verdict]:
+    """Every limit of the pass criteria that are known, for every run that they judge (see `criteria_failures`)."""
+    runs = list(runs)
+    judged = [run for run in runs if run["flown"]] or runs
+    return [
+        Verdict(run["estimator"], quantity, run[quantity], bound, limits[bound])
+        for quantity, limits in criteria.items()
+        if quantity in QUANTITIES
+        for run in judged
+        for bound in ("min", "max")
+        if limits.get(bound) is not None
+    ]
+
+
 def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterable[Run]) -> list[str]:
     """The pass criteria of a mission that its runs miss, one line each.
 
@@ -70,23 +105,18 @@ def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterabl
         runs: of one flight, from `estimator_runs`.
     """
     runs = list(runs)
-    judged = [run for run in runs if run["flown"]] or runs
-    failures = []
-    for quantity, limits in criteria.items():
-        if quantity not in QUANTITIES:
-            failures.append(f"criteria.{unknown_name(quantity, QUANTITIES)}")
-            continue
-        for run in judged:
-            value = run[quantity]
-            where = f"{run['estimator']}: {quantity}"
-            if value is None:
-                failures.append(f"{where} has no value, but criteria.{quantity} asks for one")
-                continue
-            low, high = limits.get("min"), limits.get("max")
-            if low is not None and not value >= low:
-                failures.append(f"{where} is {value:.6g}, below criteria.{quantity}.min {low:g}")
-            if high is not None and not value <= high:
-                failures.append(f"{where} is {value:.6g}, above criteria.{quantity}.max {high:g}")
-    if criteria and not judged:
+    unknown = [quantity for quantity in criteria if quantity not in QUANTITIES]
+    failures = [f"criteria.{unknown_name(quantity, QUANTITIES)}" for quantity in unknown]
+    missed = [verdict for verdict in criteria_verdicts(criteria, runs) if not verdict.passed]
+    failures += dict.fromkeys(map(_failure, missed))
+    if criteria and not runs:
         failures.append("the flight has no estimate that criteria could judge")
     return failures
+
+
+def _failure(missed: Verdict) -> str:
+    where, criterion = f"{missed.estimator}: {missed.quantity}", f"criteria.{missed.quantity}"
+    if missed.value is None:
+        return f"{where} has no value, but {criterion} asks for one"
+    side = "below" if missed.bound == "min" else "above"
+    return f"{where} is {missed.value:.6g}, {side} {criterion}.{missed.bound} {missed.limit:g}"

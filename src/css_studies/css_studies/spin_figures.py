@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from css_estimation.coning import Coning, Passages
 from css_estimation.coning_angle import extremum_differences
@@ -22,6 +23,8 @@ from css_studies.figure_style import (
     style,
 )
 
+_SMALL, _ROW, _ROWS = 7.0, 10.0, 3  # [points] of names of events, and how many rows of them there are
+
 Event = tuple[float, str]
 """Time [s] and what happened."""
 
@@ -37,21 +40,31 @@ def write_rate_figure(passages: Passages, path: Path, events: Sequence[Event] = 
         below.plot(passages.time, np.degrees(passages.angle), ".", color=BLUE, markersize=1.5)
         below.set_ylabel("Sun angle [deg]")
         below.set_xlabel("time [s]")
-        for i, (time, name) in enumerate(events):
-            for axes in (above, below):
-                axes.axvline(time, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
-            above.annotate(
-                name,
-                (time, 1.0 - 0.3 * (i % 3)),  # deployments follow each other closely
-                xycoords=("data", "axes fraction"),
-                xytext=(2, -2),
-                textcoords="offset points",
-                rotation=90,
-                va="top",
-                fontsize=7.0,
-                color=DARK_GREY,
-            )
+        _mark_events(above, below, events)
         return save(figure, path)
+
+
+def _mark_events(above: Axes, below: Axes, events: Sequence[Event]) -> None:
+    """Lines through both, with names in rows of their own above the data: deployments follow each other closely."""
+    low, high = above.get_ylim()
+    above.set_ylim(low, high + 0.3 * (high - low))
+    _, last = above.get_xlim()
+    for i, (time, name) in enumerate(events):
+        for axes in (above, below):
+            axes.axvline(time, color=GREY, linewidth=0.8, linestyle=(0, (4, 3)))
+        is_late = time > 0.8 * last
+        above.annotate(
+            name,
+            (time, 1.0),
+            xycoords=("data", "axes fraction"),
+            xytext=(-3 if is_late else 3, -2 - _ROW * (i % _ROWS)),
+            textcoords="offset points",
+            va="top",
+            ha="right" if is_late else "left",
+            fontsize=_SMALL,
+            color=DARK_GREY,
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},  # the next event's line ends there
+        )
 
 
 def write_coning_figure(passages: Passages, windows: Mapping[str, Coning], path: Path, start: float = 0.0) -> Path:

@@ -19,6 +19,8 @@ from css_msgs.msg import AttitudeEstimate, ConingEstimate, SlitSunAngle
 from css_recording.bag_reader import BagReader
 from css_studies.direct_flight import fly_and_keep
 
+UNNAMED = "before another one in the same cycle, which is the one that is named"
+"""Reason of a refusal of which a message tells no more than that it was."""
 TYPES = (SlitSunAngle, AttitudeEstimate, ConingEstimate)
 """What the estimators of a spinning payload publish."""
 
@@ -33,7 +35,7 @@ class SpinFlight:
         attitudes: `AttitudeEstimate` messages that are new, in the order of time.
         coning: `ConingEstimate` messages at the end of a leg, by leg.
         refused: pulses and passages refused.
-        reasons: cycles by the last refusal in them.
+        reasons: refusals by reason; together they are `refused`.
     """
 
     mission: Mission
@@ -83,15 +85,28 @@ def spin_flight(mission: Mission, samples: Mapping[type, Sequence[Sample]]) -> S
     """The flight that these messages tell of."""
     angles = samples.get(SlitSunAngle, ())
     coning = [c for c in samples.get(ConingEstimate, ()) if c.validity == ConingEstimate.VALIDITY_VALID and c.complete]
-    reasons = Counter(REASONS[a.reason] for a in angles if a.reason != REASON_NONE)
     return SpinFlight(
         mission,
         passages_of(angles, mission.values),
         [a for a in samples.get(AttitudeEstimate, ()) if a.validity == AttitudeEstimate.VALIDITY_VALID],
         {int(c.leg): c for c in coning},
         int(angles[-1].refused) if angles else 0,
-        reasons,
+        _reasons(angles),
     )
+
+
+def _reasons(angles: Sequence[Sample]) -> Counter[str]:
+    """Refusals by reason. A message counts all and names the last of its cycle; what came before that has no name."""
+    reasons: Counter[str] = Counter()
+    before = 0
+    for angle in angles:
+        new = int(angle.refused) - before
+        before = int(angle.refused)
+        if new > 0:
+            named = angle.reason != REASON_NONE
+            reasons[REASONS[angle.reason] if named else UNNAMED] += 1
+            reasons[UNNAMED] += new - 1
+    return +reasons
 
 
 def passages_of(angles: Sequence[Sample], values: Values) -> Passages:

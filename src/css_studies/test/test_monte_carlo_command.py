@@ -35,7 +35,8 @@ def test_json_on_the_last_line(tmp_path, capsys):
         for gyro in ("on", "off")
     ]
     assert sorted(file.name for file in folder.iterdir()) == ["cases.parquet", "percentiles.parquet", "study.json"]
-    assert sum("noise=0.1" in line for line in lines[:-1]) == 1
+    rows = [line.split()[:3] for line in lines[:-1] if line.split()[:1] in (["ekf"], ["wavg"])]
+    assert rows == [[name, gyro, noise] for name in ("ekf", "wavg") for gyro in ("on", "off") for noise in ("0", "0.1")]
 
 
 def test_the_seed_changes_the_cases(tmp_path, capsys):
@@ -91,6 +92,6 @@ def test_one_line_and_code_2_for_what_is_wrong(what, tmp_path, capsys):
     out = [] if what == "folder" else ["--out", str(folder)]
     assert main([*mission, *out, *arguments]) == 2
     err = capsys.readouterr().err
-    assert err.startswith("monte-carlo: ") and reason in err
+    assert err.startswith("monte_carlo: error: ") and reason in err
     assert err.count("\n") == 1
     assert not folder.exists(), "nothing is left that looks like a study"

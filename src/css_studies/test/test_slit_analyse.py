@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from spinning import STEADY, motion_of, pulses_of, sun_over_andoya
 
-from css_studies.commands.slit_analyse import FAILED, USAGE, main
+from css_common.command import FAILED, USAGE
+from css_studies.commands.slit_analyse import main
 from css_studies.slit_file import SlitFileError, read_slit_file
 
 NAMES = ("upper", "vertical", "lower")
@@ -49,6 +50,20 @@ def test_products_of_a_file(pulse_file, tmp_path, capsys):
     assert len(lines) == 1 + result["passages"]
 
 
+def test_what_the_pulses_leave_open_is_said_and_the_exit_code_knows(pulse_file, capsys, monkeypatch):
+    monkeypatch.setattr("css_estimation.coning.fit_motion", lambda *arguments: None)
+    code, out, err = run(capsys, pulse_file, "--inertia-ratio", 1.0, "--json")
+    assert code == FAILED
+    assert err == "slit_analyse: error: coning, 0.25 to 29.97 s: the period is ambiguous, see the candidates\n"
+    coning = json.loads(out.splitlines()[-1])["windows"][0]["coning"]
+    assert (coning["chosen"], coning["rivals"]) == (1, [2])
+    (rival,) = [line for line in out.splitlines() if "as good" in line]
+    assert "0.1412" in rival
+    assert "ambiguous, 0.1412 s may as well be" in out
+    code, _, err = run(capsys, pulse_file, "--inertia-ratio", 0.7)
+    assert (code, err) == (0, "")
+
+
 def test_windows_are_analysed_one_by_one(pulse_file, capsys):
     code, out, _ = run(capsys, pulse_file, "--window", "0:15", "--window", "15:30", "--window", "29:30", "--json")
     assert code == 0
@@ -79,7 +94,7 @@ def test_a_broken_file_is_named_with_its_line(text, message, tmp_path, capsys):
     path.write_text(text, encoding="utf-8")
     code, out, err = run(capsys, path)
     assert (code, out) == (USAGE, "")
-    assert err.startswith(f"slit_analyse: {path}: ")
+    assert err.startswith(f"slit_analyse: error: {path}: ")
     assert message in err
     assert len(err.splitlines()) == 1
 

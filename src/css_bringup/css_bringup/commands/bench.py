@@ -16,15 +16,15 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from rich.table import Table
-
 from css_bringup import monte_carlo_bench
 from css_bringup.flight import FlightResult
 from css_bringup.flying import fly, own_domain
 from css_bringup.json_process import MeasurementError
-from css_bringup.options import FAILED, add_domain_option, complain, console, guarded, whole_number
+from css_bringup.options import add_domain_option, complain, console, guarded, whole_number
 from css_bringup.report import print_json
+from css_common.command import CommandParser, command_parser
 from css_common.mission import Mission, load_mission
+from css_studies.readable_table import ReadableTable
 
 _CONFIGURATIONS = {
     "composed": (False, False),
@@ -33,11 +33,12 @@ _CONFIGURATIONS = {
     "processes_recorded": (True, True),
 }
 
+_EXAMPLES = ("graph", "graph --duration 60 --repeats 1 --json", "monte-carlo --cases 100")
+_EXITS = {1: "a flight failed, or one side cannot be measured"}
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "bench", __doc__, _EXAMPLES, _EXITS)
     subjects = parser.add_subparsers(dest="subject", required=True, metavar="{graph,monte-carlo}")
     graph = subjects.add_parser("graph", help="the graph of nodes in lockstep")
     graph.add_argument("--mission", default="okeefe_2013", help="mission to fly (default: %(default)s)")
@@ -57,16 +58,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: _run(arguments), (MeasurementError,))
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    try:
-        arguments.run(arguments)
-    except MeasurementError as error:
-        complain("error:", error)
-        return FAILED
+    arguments.run(arguments)
     return 0
 
 
@@ -77,10 +75,13 @@ def _bench_graph(arguments: argparse.Namespace) -> None:
     with own_domain(mission, arguments.domain, None, console) as domain:
         measured = _measure(mission, arguments.repeats)
     figures = {name: _figures(results) for name, results in measured.items()}
-    table = Table("graph", "real-time factor", "CPU us per step", "messages lost")
+    table = ReadableTable()
+    table.add_name("graph")
+    for heading in ("real-time\nfactor", "CPU us\nper step", "messages\nlost"):
+        table.add_number(heading)
     for name, row in figures.items():
-        table.add_row(
-            name, f"{row['realtime_factor']:.0f}", f"{row['cpu_us_per_step']:.0f}", str(row["messages_lost"])
+        table.add_texts(
+            [name, f"{row['realtime_factor']:.0f}", f"{row['cpu_us_per_step']:.0f}", str(row["messages_lost"])]
         )
     console.print(table)
     if arguments.json:

@@ -15,8 +15,6 @@ from css_bringup.figures import print_figures
 from css_bringup.flight import default_bag
 from css_bringup.flying import fly, own_domain
 from css_bringup.options import (
-    FAILED,
-    INTERRUPTED,
     add_domain_option,
     add_mission_options,
     add_output_options,
@@ -27,18 +25,20 @@ from css_bringup.options import (
     mission_of,
 )
 from css_bringup.replay import parse_request
-from css_bringup.replaying import replay
+from css_bringup.replaying import default_replay, replay
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
+from css_common.progress_lines import still_working
 from css_studies.flight_log import read_flight
 from css_studies.flight_metrics import estimator_runs
 
+_EXAMPLES = ("", "okeefe_2013 --duration 600 --out bags/first", "okeefe_2013 --case 7 --figures figures")
+_EXITS = {0: "flown, and all pass criteria of the mission met", 1: "the flight failed or missed a criterion"}
 _REPLAYED = ("ekf", "ekf:gyro=off", "wavg", "wavg:gyro=off")
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="demo", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "demo", __doc__, _EXAMPLES, _EXITS)
     add_mission_options(parser)
     add_domain_option(parser)
     add_output_options(parser)
@@ -48,8 +48,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: _run(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -73,8 +74,9 @@ def _run(arguments: argparse.Namespace) -> int:
     flown = estimator_runs(log, [mission.values.graph.estimator])
     print_result(console, flight, flown)
     console.print("\nReplaying the recording through every Sun estimator, with gyro and without:")
-    copy = bag.with_name(f"{bag.name}_replay")
-    replayed = replay(bag, copy, mission, map(parse_request, _REPLAYED), {}, overwrite=arguments.overwrite)
+    copy = default_replay(bag, overwrite=arguments.overwrite)
+    with still_working(f"replaying {bag}"):
+        replayed = replay(bag, copy, mission, map(parse_request, _REPLAYED), {}, overwrite=arguments.overwrite)
     print_replay(replayed)
     folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
     print_figures(log, folder)

@@ -7,8 +7,6 @@ import sys
 from css_bringup.flight import FlightResult, default_bag
 from css_bringup.flying import fly, own_domain
 from css_bringup.options import (
-    FAILED,
-    INTERRUPTED,
     add_domain_option,
     add_mission_options,
     add_output_options,
@@ -19,6 +17,7 @@ from css_bringup.options import (
     mission_of,
 )
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
 from css_common.mission import Mission
 from css_recording.errors import BagError
 from css_studies.flight_log import read_flight
@@ -26,9 +25,17 @@ from css_studies.flight_metrics import Run, estimator_runs
 from css_studies.spin_flight import read_spinning
 from css_studies.spin_summary import spin_lines, spin_object
 
+_EXAMPLES = (
+    "okeefe_2013",
+    "okeefe_2013 --case 137 --set ekf.use_gyro=false",
+    "okeefe_2013 --duration 600 --processes --out bags/mine",
+    "my_mission.yaml --realtime 10",
+)
+_EXITS = {0: "flown, and all pass criteria of the mission met", 1: "the flight failed or missed a criterion"}
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="fly", description=__doc__)
+
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "fly", __doc__, _EXAMPLES, _EXITS)
     add_mission_options(parser)
     parser.add_argument("--processes", action="store_true", help="one supervised process per node")
     parser.add_argument(
@@ -43,8 +50,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; 0: flown and all pass criteria of the mission met."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: _run(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -7,12 +7,6 @@ parameters it had, gives the bytes that flew; the result says so.
 
 What the mission scripted and what was set in flight happens to the estimators that it was addressed to, as in flight.
 A value that is asked for here (NAME:KEY=VALUE, --set) stays.
-
-exit codes:
-  0  each estimator gave estimates, and where one flew as it is replayed, all its bytes are those that flew; values
-     within 1e-6 of them when the flight was made with another processor or other library versions
-  1  an estimator gave nothing, or estimates differ from the flight, stand on one side only or could not be compared
-  2  the request or the recording is wrong
 """
 
 import argparse
@@ -20,20 +14,30 @@ import sys
 from pathlib import Path
 
 from css_bringup.figures import print_figures
-from css_bringup.options import FAILED, complain, console, guarded
+from css_bringup.options import complain, console, guarded
 from css_bringup.replay import parse_request
 from css_bringup.replay_verdict import is_rounding
 from css_bringup.replayed import Replayed
-from css_bringup.replaying import ReplayResult, mission_of_bag, replay
+from css_bringup.replaying import ReplayResult, default_replay, mission_of_bag, replay
 from css_bringup.report import print_json
+from css_common.command import FAILED, CommandParser, command_parser
 from css_common.mission_file import MissionError
+from css_common.progress_lines import still_working
 from css_studies.flight_summary import summary_table
 
+_EXAMPLES = (
+    "bags/FLIGHT",
+    "bags/FLIGHT --estimators wavg:gate=0.3 ekf:gyro=off --figures figures",
+    "bags/FOREIGN --mission okeefe_2013 --remap /sensors/css:=/css/voltages",
+)
+_EXITS = {
+    0: "each estimator gave estimates; one that flew gave the bytes that flew (values within 1e-6 on another machine)",
+    1: "an estimator gave nothing, or its estimates differ from the flight or could not be compared with it",
+}
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="replay", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+
+def _parser() -> CommandParser:
+    parser = command_parser("css_bringup", "replay", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("bag", type=Path, help="recording: a rosbag2 folder or an .mcap file")
     parser.add_argument(
         "--estimators", nargs="+", default=["wavg", "wavg:gyro=off", "ekf", "ekf:gyro=off"], metavar="NAME[:KEY=VALUE]",
@@ -46,7 +50,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--remap", nargs="+", default=[], metavar="OLD:=NEW", help="topics of the recording under the graph's names"
     )
-    parser.add_argument("--out", type=Path, metavar="DIR", help="new recording (default: BAG_replay)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="new recording (default: BAG_replay, or _replay_2 ...)")
     parser.add_argument("--overwrite", action="store_true", help="replace a recording that is there")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="write figures of the comparison as PNG")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
@@ -55,24 +59,26 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(args: list[str] | None = None) -> int:
     """Entry point; exit codes are in the description of the command."""
-    arguments = _parser().parse_args(args)
-    return guarded(lambda: _run(arguments))
+    parser = _parser()
+    arguments = parser.parse_args(args)
+    return guarded(parser.prog, lambda: _run(arguments))
 
 
 def _run(arguments: argparse.Namespace) -> int:
     remap = dict(_remapping(item) for item in arguments.remap)
     requests = [parse_request(text) for text in arguments.estimators]
     mission = mission_of_bag(arguments.bag, remap, arguments.overrides, arguments.mission)
-    default = arguments.bag.with_name(f"{arguments.bag.stem if arguments.bag.is_file() else arguments.bag.name}_replay")
-    result = replay(
-        arguments.bag,
-        arguments.out or default,
-        mission,
-        requests,
-        remap,
-        overrides=arguments.overrides,
-        overwrite=arguments.overwrite,
-    )
+    out = arguments.out or default_replay(arguments.bag, overwrite=arguments.overwrite)
+    with still_working(f"replaying {arguments.bag}"):
+        result = replay(
+            arguments.bag,
+            out,
+            mission,
+            requests,
+            remap,
+            overrides=arguments.overrides,
+            overwrite=arguments.overwrite,
+        )
     print_replay(result)
     if arguments.figures:
         print_figures(result.log, arguments.figures)

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Turns a table of telemetry into a recording. `import_csv --help` tells how it is used."""
 
-import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from css_common.command import FAILED, CommandParser, command_parser, complain
 from css_common.epochs import parse_utc
 from css_recording import cell_layout, telemetry_table
 from css_recording.bag_folder import fresh_folder
@@ -24,10 +24,15 @@ The layout file says which columns are cells:
 {cell_layout.__doc__}
 """
 
-_EPILOG = """\
+_NOTES = """\
 A missing cell output becomes NaN, a line without any cell output a gap, a missing rate a gyro that does not
-measure. With the Sun vector the recording holds `truth`, in which body and inertial frame are the same.
-Exit code: 0 imported, 1 a file cannot be read or written or a line is broken, 2 wrong usage."""
+measure. With the Sun vector the recording holds `truth`, in which body and inertial frame are the same."""
+
+_EXAMPLES = (
+    "docs/samples/my_cells.csv docs/samples/my_layout.yaml -o bags/mine",
+    "counts.csv layout.yaml --epoch 2024-03-20T12:00:00Z --full-scale 3000 --skip-bad",
+)
+_EXITS = {0: "imported", 1: "a file cannot be read or written, or a line is broken"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -45,8 +50,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         telemetry = read_telemetry(source, layout, epoch_ns, options.full_scale, options.skip_bad)
         report = import_telemetry(telemetry, layout, source, folder, overwrite=options.overwrite)
     except BagError as error:
-        print(f"import_csv: {error}", file=sys.stderr)
-        return 1
+        complain(parser.prog, error)
+        return FAILED
     print(_summary(report))
     return 0
 
@@ -78,13 +83,8 @@ def _positive(text: str) -> float:
     return value
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "import_csv",
-        description=_DESCRIPTION,
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
+def _parser() -> CommandParser:
+    parser = command_parser("css_recording", "import_csv", _DESCRIPTION, _EXAMPLES, _EXITS, _NOTES)
     parser.add_argument("table", help="CSV file of telemetry")
     parser.add_argument("layout", help="YAML or CSV file of cell names and normals")
     parser.add_argument("-o", "--output", metavar="FOLDER", help="new recording (default: bags/NAME_TIME)")

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finishes the recording of a recorder that was killed. `recover --help` tells how it is used."""
 
-import argparse
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 
+from css_common.command import USAGE, command_parser, complain, guarded
+from css_common.progress_lines import still_working
 from css_recording.errors import BagError
 from css_recording.recovery import RecoveryReport, recover
 
@@ -12,22 +14,28 @@ _DESCRIPTION = """\
 Finish a recording whose recorder was killed: keep every intact chunk, index it, and write the metadata that
 the recorder had no time for. A complete recording is left as it is."""
 
-_EXIT = "Exit code: 0 the recording is complete (now), 1 it cannot be recovered, 2 wrong usage."
+_EXAMPLES = ("bags/FLIGHT", "bags/FLIGHT -o bags/mended")
+_EXITS = {0: "the recording is complete (now)", 1: "it cannot be recovered", 2: "there is none, or an option is wrong"}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    parser = argparse.ArgumentParser("recover", description=_DESCRIPTION, epilog=_EXIT)
-    parser.add_argument("recording", help="folder of the recording, or its .mcap file")
+    parser = command_parser("css_recording", "recover", _DESCRIPTION, _EXAMPLES, _EXITS)
+    parser.add_argument("recording", type=Path, help="folder of the recording, or its .mcap file")
     parser.add_argument(
-        "-o", "--output", help="write the finished recording to this new folder; leave the torn one untouched"
-    )
+        "-o", "--output", metavar="FOLDER",
+        help="write the finished recording to this new folder, the torn one stays (default: mend it in place)",
+    )  # fmt: skip
     options = parser.parse_args(arguments)
-    try:
-        report = recover(options.recording, options.output)
-    except BagError as error:
-        print(f"recover: {error}", file=sys.stderr)
-        return 1
+    if not options.recording.exists():
+        complain(parser.prog, f"{options.recording}: there is no such recording")
+        return USAGE
+    return guarded(parser.prog, lambda: _run(options.recording, options.output), (), (BagError,))
+
+
+def _run(recording: Path, output: str | None) -> int:
+    with still_working(f"recovering {recording}"):
+        report = recover(recording, output)
     print(_summary(report))
     return 0
 

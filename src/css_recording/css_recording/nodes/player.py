@@ -2,26 +2,49 @@
 """Player process: `player --help` tells how it is used."""
 
 import argparse
+import json
+import math
 import sys
 from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
 
-import rclpy
-from rclpy.signals import SignalHandlerOptions
-
+from css_common.command import CommandParser, command_parser, complain, guarded, number, positive
 from css_common.executor import create_executor
 from css_common.stop_signal import StopSignal
-from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
+from css_recording.merged_bags import MergedBags
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
 from css_recording.player import PlayerNode
-from css_recording.process import split_arguments
+from css_recording.process import RosArgumentsError, ros_process, split_arguments
+from css_recording.qos_overrides import read_qos_overrides
+from css_recording.terminal_keys import TerminalKeys
 
 _DESCRIPTION = """\
-Publish a recording to live nodes. Topics that a live node publishes are left to it. With --wait-for the playback is
-in lockstep: the next stamp follows when all these topics have answered the last one."""
+Publish a recording, or several merged by time, to live nodes. Topics that a live node publishes are left to it.
+With --wait-for the playback is in lockstep: the next stamp follows when all these topics have answered the last."""
 
-_EPILOG = """\
-Exit code: 0 played or stopped by a signal, 1 the recording cannot be read or a node does not answer, 2 wrong usage."""
+_NOTES = """\
+keys, on a terminal: SPACE hold or go on; RIGHT next message, S next stamp, while held; UP and DOWN rate +10 and -10 %.
+services: ~/pause ~/resume ~/toggle_paused ~/is_paused ~/play_next ~/play_next_stamp ~/get_rate, of the types of
+  rosbag2_interfaces where that is installed, then also ~/set_rate; else std_srvs/srv/Trigger, whose text answers.
+parameter: rate, at any time: ros2 param set /player rate 2.0
+  The node is /player; --ros-args -r __node:=rosbag2_player gives the services the full names that rosbag2 has."""
+
+_EXAMPLES = (
+    "bags/FLIGHT",
+    "bags/FLIGHT --rate 10 --start 100 --end 200 --clock",
+    "bags/FLIGHT --topic css/voltages --topic gyro/imu --wait-for ekf/sun_estimate",
+    "bags/FLIGHT bags/OTHER --start-paused --qos-profile-overrides-path qos.yaml",
+)
+_EXITS = {
+    0: "played, or stopped by a signal",
+    1: "a node does not answer, or nothing is left to play",
+    2: "a recording or an option is wrong",
+}
+
+_seconds = number("seconds from 0 on", lambda value: 0.0 <= value < math.inf)
+_rate = number("a number above 0, or inf", lambda value: value > 0.0)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -29,25 +52,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
     own, for_ros = split_arguments(sys.argv[1:] if arguments is None else arguments)
     parser = _parser()
     options = parser.parse_args(own)
-    try:
-        remap = dict(_renaming(text) for text in options.remap)
-    except ValueError as error:
-        parser.error(str(error))
+    if options.end is not None and options.end <= options.start:
+        parser.error(f"--end {options.end:g}: expected more than the start, {options.start:g} s")
     stop = StopSignal()
-    rclpy.init(args=["player", *for_ros], signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        with BagReader(options.recording, remap) as reader:
-            print(_summary(_play(reader, options, stop)))
-        return 0
-    except (BagError, PlaybackError) as error:
-        print(f"player: {error}", file=sys.stderr)
-        return 1
-    finally:
-        rclpy.try_shutdown()
+    wrong = (BagError, RosArgumentsError)
+    return guarded(parser.prog, lambda: _run(parser, options, for_ros, stop), wrong, (PlaybackError,))
 
 
-def _play(reader: BagReader, options: argparse.Namespace, stop: StopSignal) -> PlaybackReport:
-    playback = PlaybackOptions(
+def _run(parser: CommandParser, options: argparse.Namespace, for_ros: Sequence[str], stop: StopSignal) -> int:
+    playback = _playback(options)
+    with MergedBags(options.recording, dict(options.remap)) as recording:
+        _name_unused_overrides(parser, playback, recording)
+        with ros_process("player", for_ros):
+            report = _play(recording, playback, stop)
+    print(_summary(report))
+    if options.json:
+        print(json.dumps(asdict(report)))
+    return 0
+
+
+def _playback(options: argparse.Namespace) -> PlaybackOptions:
+    return PlaybackOptions(
         rate=float("inf") if options.rate is None and options.wait_for else options.rate or 1.0,
         wait_for=tuple(options.wait_for),
         pace=options.pace,
@@ -56,18 +81,34 @@ def _play(reader: BagReader, options: argparse.Namespace, stop: StopSignal) -> P
         start=options.start,
         end=options.end,
         topics=tuple(options.topic) or None,
+        paused=options.start_paused,
+        loop=options.loop,
+        qos=read_qos_overrides(options.qos_profile_overrides_path),
     )
-    node = PlayerNode(reader, playback)
+
+
+def _name_unused_overrides(parser: CommandParser, playback: PlaybackOptions, recording: MergedBags) -> None:
+    unused = playback.qos.keys() - {entry.topic.name for entry in recording.topics}
+    if unused:
+        where = "is for a topic that the recording does not hold"
+        complain(parser.prog, f"quality of service of {', '.join(sorted(unused))} {where}", "warning")
+
+
+def _play(recording: MergedBags, playback: PlaybackOptions, stop: StopSignal) -> PlaybackReport:
+    node = PlayerNode(recording, playback)
     executor = create_executor()
     executor.add_node(node)
     try:
-        report = node.play(executor, lambda: stop.came)
-        while options.loop and report.stamps and not stop.came:
-            report = node.play(executor, lambda: stop.came)
-        return report
+        with TerminalKeys() as keys:
+            return node.play(executor, lambda: stop.came, lambda: _obey(node, keys))
     finally:
         executor.remove_node(node)
         node.destroy_node()
+
+
+def _obey(node: PlayerNode, keys: TerminalKeys) -> None:
+    for key in keys.read():
+        node.controls.press(key)
 
 
 def _summary(report: PlaybackReport) -> str:
@@ -81,36 +122,30 @@ def _summary(report: PlaybackReport) -> str:
 def _renaming(text: str) -> tuple[str, str]:
     old, separator, new = text.partition(":=")
     if not (old and separator and new):
-        raise ValueError(f"--remap {text}: expected OLD:=NEW")
+        raise argparse.ArgumentTypeError(f"{text} given, expected OLD:=NEW")
     return old, new
 
 
-def _positive(text: str) -> float:
-    value = float(text)
-    if not value > 0.0:
-        raise ValueError
-    return value
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("player", description=_DESCRIPTION, epilog=_EPILOG)
-    parser.add_argument("recording", help="folder of the recording, or its .mcap file")
-    parser.add_argument(
-        "--rate", type=_positive, help="recorded seconds per second, 'inf' for no limit (default: 1; lockstep: inf)"
-    )
-    parser.add_argument(
-        "--wait-for", metavar="TOPIC", action="append", default=[], help="lockstep with this topic; may be repeated"
-    )
-    parser.add_argument("--pace", metavar="TOPIC", help="answers are due to stamps of this topic (default: busiest)")
-    parser.add_argument(
-        "--patience", metavar="S", type=_positive, default=30.0, help="wall time allowed for an answer [s] (30)"
-    )
-    parser.add_argument("--topic", action="append", default=[], help="play this topic only; may be repeated")
-    parser.add_argument("--remap", metavar="OLD:=NEW", action="append", default=[], help="rename a recorded topic")
-    parser.add_argument("--start", metavar="S", type=float, default=0.0, help="begin S seconds into the recording")
-    parser.add_argument("--end", metavar="S", type=float, help="end S seconds into the recording")
-    parser.add_argument("--loop", action="store_true", help="begin again at the end, with the same stamps")
-    parser.add_argument("--clock", action="store_true", help="publish the recorded time on /clock")
+def _parser() -> CommandParser:
+    parser = command_parser("css_recording", "player", _DESCRIPTION, _EXAMPLES, _EXITS, _NOTES)
+    add = parser.add_argument
+    add("recording", nargs="+", type=Path, help="folder of a recording, or its .mcap file; several are merged by time")
+    add("--rate", type=_rate, help="recorded seconds per second, inf for no limit (default: 1; lockstep: inf)")
+    add("--start-paused", action="store_true", help="begin held: SPACE or ~/resume lets it go")
+    add("--start", metavar="S", type=_seconds, default=0.0, help="begin S seconds into the recording (default: 0)")
+    add("--end", metavar="S", type=_seconds, help="end S seconds into the recording (default: with its last message)")
+    add("--topic", action="append", default=[], help="play this topic only; may be repeated (default: all)")
+    add("--remap", metavar="OLD:=NEW", type=_renaming, action="append", default=[], help="rename a recorded topic")
+    add("--loop", action="store_true", help="begin again at the end, with the same stamps")
+    add("--clock", action="store_true", help="publish the recorded time on /clock")
+    add("--wait-for", metavar="TOPIC", action="append", default=[], help="lockstep with this topic; may be repeated")
+    add("--pace", metavar="TOPIC", help="answers are due to stamps of this topic (default: busiest)")
+    add("--patience", metavar="S", type=positive, default=30.0, help="wall time for an answer [s] (default: 30)")
+    add(
+        "--qos-profile-overrides-path", metavar="FILE", type=Path,
+        help="quality of service of topics, in rosbag2's YAML (default: reliable, transient local, depth 100)",
+    )  # fmt: skip
+    add("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser
 
 

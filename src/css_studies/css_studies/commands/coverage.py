@@ -8,23 +8,27 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
+from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_sim.nodes.css_array import CssArray
 from css_studies.coverage import grid_of, layout_of_mission, map_cells
 from css_studies.coverage_figures import write_coverage_figures
 from css_studies.coverage_statistics import coverage_object
+from css_studies.readable_table import ReadableTable
 
-USAGE = 2
-_EPILOG = "Exit code: 0 done, 2 the mission or an override is wrong, or a figure cannot be written."
+_EXAMPLES = (
+    "okeefe_2013",
+    "okeefe_2013 --set cells.field_of_view_deg=140 --figures maps",
+    "my_mission.yaml --json",
+)
+_EXITS = {2: "the mission or an override is wrong, or a figure cannot be written"}
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="coverage", description=__doc__, epilog=_EPILOG)
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "coverage", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument(
         "mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)"
     )
@@ -34,7 +38,7 @@ def _parser() -> argparse.ArgumentParser:
         default=[],
         metavar="KEY=VALUE",
         dest="overrides",
-        help="change one parameter, for instance --set cells.field_of_view_deg=140; may be repeated",
+        help="change one parameter; may be repeated",
     )
     parser.add_argument(
         "--figures", type=Path, metavar="DIR", help="write the maps as PNG files into this folder"
@@ -47,13 +51,14 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
-    try:
-        mission = load_mission(options.mission, options.overrides)
-        result, files = study(mission, options.figures)
-    except (MissionError, OSError) as error:
-        print(f"coverage: {error}", file=sys.stderr)
-        return USAGE
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    return guarded(parser.prog, lambda: _run(options), (MissionError, OSError))
+
+
+def _run(options: argparse.Namespace) -> int:
+    mission = load_mission(options.mission, options.overrides)
+    result, files = study(mission, options.figures)
     _print_tables(result, Console(highlight=False))
     for file in files:
         print(f"figure: {file}")
@@ -83,24 +88,22 @@ def study(mission: Mission, figures: Path | None = None) -> tuple[dict[str, Any]
 
 
 def _print_tables(result: dict[str, Any], console: Console) -> None:
-    seen = Table(
-        title=f"{result['mission']}: {result['cells']} cells", title_justify="left", box=box.SIMPLE_HEAD
-    )
-    seen.add_column("cells that see the Sun")
-    seen.add_column("share of the sphere, %", justify="right")
+    seen = ReadableTable(f"{result['mission']}: {result['cells']} cells")
+    seen.add_name("cells that see the Sun")
+    seen.add_number("share of the\nsphere, %")
     for count, fraction in enumerate(result["seen_by_fraction"]):
-        seen.add_row(f"{count}", f"{100.0 * fraction:.2f}")
+        seen.add_texts([f"{count}", f"{100.0 * fraction:.2f}"])
     console.print(seen)
     if not result["holes"]:
         console.print(" holes: none")
     for hole in result["holes"]:
         console.print(f" hole: {_hole(hole)}", soft_wrap=True)
-    errors = Table(title="weighted average, angles in deg", title_justify="left", box=box.SIMPLE_HEAD)
-    errors.add_column("Sun angles are from the array normal", no_wrap=True)
-    errors.add_column("ideal cosine", justify="right")
-    errors.add_column("warped", justify="right")
+    errors = ReadableTable("weighted average, angles in deg")
+    errors.add_name("Sun angles are from the array normal")
+    errors.add_number("ideal\ncosine")
+    errors.add_number("warped")
     for label, texts in _error_rows(result["wavg_ideal"], result["wavg_warped"]):
-        errors.add_row(label, *texts)
+        errors.add_texts([label, *texts])
     console.print(errors)
 
 

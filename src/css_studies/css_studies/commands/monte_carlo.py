@@ -9,18 +9,17 @@ again, and ends with the same bytes. `fly MISSION --case K` flies one of the cas
 import argparse
 import itertools
 import json
+import re
 import signal
 import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
-from rich.text import Text
 
 from css_common import places
+from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
@@ -28,24 +27,20 @@ from css_studies.monte_carlo.mission_flight import refuse_uncovered
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.schedulers import DaskScheduler
 from css_studies.monte_carlo.study_summary import study_object
+from css_studies.readable_table import ReadableTable
 
-USAGE, INTERRUPTED = 2, 130
-
-_EPILOG = """examples:
-  monte-carlo okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off
-  monte-carlo okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2
-  monte-carlo okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786
-
+_EXAMPLES = (
+    "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
+    "okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2",
+    "okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786",
+)
+_NOTES = """\
 Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
-percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for.
-
-Exit code: 0 done, 2 something asked for is wrong, 130 interrupted."""
+percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for."""
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="monte-carlo", description=__doc__, epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "monte_carlo", __doc__, _EXAMPLES, notes=_NOTES)
     add = parser.add_argument
     add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
     add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
@@ -72,17 +67,12 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     # a killed terminal or `kill` end it as Ctrl-C does: finished chunks stay
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        return _run(options)
-    except (MissionError, StudyError) as error:
-        print(f"monte-carlo: {error}", file=sys.stderr)
-        return USAGE
-    except KeyboardInterrupt:
-        print("monte-carlo: interrupted; the same command with the same --out goes on from here", file=sys.stderr)
-        return INTERRUPTED
+    interrupted = "interrupted; the same command with the same --out goes on from here"
+    return guarded(parser.prog, lambda: _run(options), (MissionError, StudyError), interrupted=interrupted)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -101,7 +91,7 @@ def _run(options: argparse.Namespace) -> int:
     messages = Console(stderr=True, highlight=False)
     begin = time.perf_counter()
     with progress_bar(messages) as bar:
-        task = bar.add_task(mission.name, total=None)
+        part = bar.add(mission.name)
         study = run_study(
             mission,
             configurations,
@@ -110,7 +100,7 @@ def _run(options: argparse.Namespace) -> int:
             first_case=options.first_case,
             sample_s=options.sample,
             threads=options.threads,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
+            progress=lambda done, total: bar.tell(part, done, total),
             scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
         )
     result = study_object(study, time.perf_counter() - begin, time.process_time())
@@ -169,18 +159,8 @@ _COLUMNS = (
 
 
 def print_study(study: Study, result: dict, console: Console) -> None:
-    """A table for each point of the sweeps, and where the files are."""
-    for point, rows in itertools.groupby(result["configurations"], key=lambda row: row["overrides"]):
-        title = " ".join(point) or None
-        table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), title=title, title_justify="left")
-        for name in ("estimator", "gyro"):
-            table.add_column(name, vertical="bottom")
-        for _, heading, _ in _COLUMNS:
-            table.add_column(Text(heading), justify="right", vertical="bottom")
-        for row in rows:
-            figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
-            table.add_row(row["estimator"], row["gyro"], *figures)
-        console.print(table)
+    """One table of all configurations, the values of a sweep below each other, and where the files are."""
+    console.print(_study_table(result["configurations"]))
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
@@ -189,6 +169,28 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     else:
         console.print("this study was complete; nothing was flown")
     console.print(f"study: {study.folder}", soft_wrap=True)
+
+
+def _study_table(rows: Sequence[dict]) -> ReadableTable:
+    table = ReadableTable()
+    table.add_name("estimator")
+    table.add_number("gyro")
+    for key in _swept(rows[0]):
+        table.add_number(re.sub(r"(?<=[._])", "\n", key))
+    for _, heading, _ in _COLUMNS:
+        table.add_number(heading)
+    # configurations go point by point; what one estimator makes of a sweep is read down a column
+    kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
+    for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
+        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+        table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
+    return table
+
+
+def _swept(row: dict) -> dict[str, str]:
+    """Values of a configuration by the keys that are swept."""
+    pairs = (override.partition("=") for override in row["overrides"])
+    return {key: value for key, _, value in pairs}
 
 
 if __name__ == "__main__":

@@ -8,26 +8,26 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from rich import box
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from css_common import places
+from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import StudyError
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.study import Progress
+from css_studies.readable_table import ReadableTable
 from css_studies.reproduce.papers import Paper, ReproductionError, Request, find_paper, paper_names
 from css_studies.reproduce.rows import Row, full_name, number, printed, row_object
 
-USAGE, INTERRUPTED = 2, 130
 CASES, QUICK_CASES = 1000, 40
-_EPILOG = "Exit code: 0 done, also when numbers miss, 2 an argument or the folder is wrong, 130 interrupted."
+_EXAMPLES = ("okeefe", "clark --quick", "digregorio --cases 200 --out reports/mine")
+_EXITS = {0: "done, also when numbers miss", 2: "an argument or the folder is wrong"}
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="reproduce", description=__doc__, epilog=_EPILOG)
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "reproduce", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("paper", metavar="PAPER", help=f"one of: {', '.join(paper_names())}")
     parser.add_argument(
         "--cases", type=int, metavar="N", help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES})"
@@ -40,17 +40,13 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
     # a killed terminal or `kill` end it as Ctrl-C does: finished flights stay
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        return _run(options)
-    except (ReproductionError, MissionError, StudyError, OSError) as error:
-        print(f"reproduce: {error}", file=sys.stderr)
-        return USAGE
-    except KeyboardInterrupt:
-        print("reproduce: interrupted; the same command goes on from here", file=sys.stderr)
-        return INTERRUPTED
+    wrong = (ReproductionError, MissionError, StudyError, OSError)
+    interrupted = "interrupted; the same command goes on from here"
+    return guarded(parser.prog, lambda: _run(options), wrong, interrupted=interrupted)
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -63,8 +59,8 @@ def _run(options: argparse.Namespace) -> int:
     with progress_bar(Console(stderr=True)) as bar:
 
         def progress(name: str) -> Progress:
-            task = bar.add_task(name, total=None)
-            return lambda done, total: bar.update(task, completed=done, total=total)
+            part = bar.add(name)
+            return lambda done, total: bar.tell(part, done, total)
 
         rows = paper.reproduce(Request(folder, cases, options.quick, progress))
     console = Console(highlight=False)
@@ -77,15 +73,14 @@ def _run(options: argparse.Namespace) -> int:
 
 def _print_table(paper: Paper, rows: Sequence[Row], console: Console) -> None:
     variants = list(dict.fromkeys(row.variant for row in rows))
-    # without a frame around the columns it fits into 80, which is what a console has that is no terminal
-    table = Table(title=paper.title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("quantity", no_wrap=True)
+    table = ReadableTable(paper.title)
+    table.add_name("quantity")
     for text in ("paper", *(variant or "here" for variant in variants)):
-        table.add_column(Text(text), justify="right", no_wrap=True)
+        table.add_number(text)
     for quantity, unit in dict.fromkeys((row.quantity, row.unit) for row in rows):
         same = {row.variant: row for row in rows if row.quantity == quantity}
         results = [_result(same.get(variant)) for variant in variants]
-        table.add_row(Text(f"{quantity} [{unit}]"), Text(printed(next(iter(same.values())))), *results)
+        table.add_texts([f"{quantity} [{unit}]", printed(next(iter(same.values()))), *results])
     console.print(table)
     for row in rows:
         if not row.ok:

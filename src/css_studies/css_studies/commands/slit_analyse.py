@@ -10,27 +10,32 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich import box
 from rich.console import Console
-from rich.table import Table
 
+from css_common.command import FAILED, CommandParser, command_parser, complain, guarded
 from css_common.schema import ParameterError, Values, default_values
 from css_common.sections import SLITS, conflicts
 from css_estimation import slit_measurement
 from css_estimation.coning import Coning, analyse_coning, justification
 from css_estimation.slit_passage import REASONS
 from css_estimation.slit_record import SlitRecord, read_record
+from css_studies.readable_table import ReadableTable
 from css_studies.slit_file import SlitFileError, read_slit_file
 from css_studies.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure
 
-FAILED, USAGE = 1, 2
-_EPILOG = (
-    "Exit code: 0 done, 1 the pulses make no passage, 2 an option or the file is wrong or a figure cannot be written."
+_EXAMPLES = (
+    "my_pulses.csv",
+    "my_pulses.csv --frequency 1e6 --inertia-ratio 0.7 --figures figures",
+    "my_pulses.csv --window 69.2:188 --window 188:300 --passages passages.csv",
 )
+_EXITS = {
+    1: "the pulses make no passage, or the coning period is ambiguous",
+    2: "an option or the file is wrong, or a figure cannot be written",
+}
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="slit_analyse", description=__doc__, epilog=_EPILOG)
+def _parser() -> CommandParser:
+    parser = command_parser("css_studies", "slit_analyse", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("file", type=Path, help="CSV file with the columns slit (upper, vertical, lower) and count")
     parser.add_argument("--frequency", type=float, default=1e6, metavar="HZ", help="of the timer (default: 1e6)")
     parser.add_argument("--inclination-deg", type=float, default=30.0, metavar="DEG", help="of the slanted slits (30)")
@@ -51,30 +56,31 @@ def _parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    return guarded(parser.prog, lambda: _run(parser.prog, options), (SlitFileError, ParameterError, OSError))
+
+
+def _run(prog: str, options: argparse.Namespace) -> int:
     console = Console(highlight=False)
-    try:
-        values = _values(options)
-        record = _record(options, values)
-        if not len(record.passages.time):
-            print(
-                f"slit_analyse: {options.file}: no passage in {record.pulses} pulses: {_refusals(record)}",
-                file=sys.stderr,
-            )
-            return FAILED
-        windows = _windows(options, values, record)
-        result = _result_object(record, windows)
-        _print(console, options, record, windows)
-        if options.passages is not None:
-            _write_passages(options.passages, record)
-        for file in _figures(options.figures, record, windows):
-            console.print(f"figure: {file}", soft_wrap=True)
-    except (SlitFileError, ParameterError, OSError) as error:
-        print(f"slit_analyse: {error}", file=sys.stderr)
-        return USAGE
+    values = _values(options)
+    record = _record(options, values)
+    if not len(record.passages.time):
+        complain(prog, f"{options.file}: no passage in {record.pulses} pulses: {_refusals(record)}")
+        return FAILED
+    windows = _windows(options, values, record)
+    result = _result_object(record, windows)
+    _print(console, options, record, windows)
+    if options.passages is not None:
+        _write_passages(options.passages, record)
+    for file in _figures(options.figures, record, windows):
+        console.print(f"figure: {file}", soft_wrap=True)
     if options.json:
         print(json.dumps(result, allow_nan=False))
-    return 0
+    ambiguous = [name for name, coning in windows.items() if coning is not None and coning.rivals]
+    for name in ambiguous:
+        complain(prog, f"coning, {name}: the period is ambiguous, see the candidates")
+    return FAILED if ambiguous else 0
 
 
 def _values(options: argparse.Namespace) -> Values:
@@ -167,6 +173,7 @@ def _window_object(name: str, coning: Coning | None) -> dict[str, Any]:
                 for candidate, residual in zip(coning.candidates, coning.residuals, strict=True)
             ],
             "chosen": coning.chosen,
+            "rivals": list(coning.rivals),
             "because": justification(coning),
         },
     }
@@ -200,19 +207,29 @@ def _print(
         console.print(f"period {1.0 / coning.frequency:.4f} s: {justification(coning)}", soft_wrap=True)
 
 
-def _candidate_table(coning: Coning) -> Table:
-    table = Table(box=box.SIMPLE_HEAD)
-    for heading in ("", "frequency Hz", "period s", "FFT period s", "inertia ratio", "power", "pulses missed by us"):
-        table.add_column(heading, justify="right")
+def _candidate_table(coning: Coning) -> ReadableTable:
+    table = ReadableTable()
+    table.add_name()
+    for heading in (
+        "frequency\n[Hz]",
+        "period\n[s]",
+        "FFT\nperiod\n[s]",
+        "inertia\nratio",
+        "power",
+        "pulses\nmissed\nby [us]",
+    ):
+        table.add_number(heading)
     for i, (candidate, residual) in enumerate(zip(coning.candidates, coning.residuals, strict=True)):
-        table.add_row(
-            "chosen" if i == coning.chosen else "",
-            f"{candidate.frequency:.4f}",
-            f"{1.0 / candidate.frequency:.4f}",
-            f"{1.0 / candidate.sequence_frequency:.4f}",
-            f"{candidate.inertia_ratio:.3f}",
-            f"{candidate.power:.4f}",
-            "-" if residual < 0.0 else f"{1e6 * residual:.3g}",
+        table.add_texts(
+            [
+                "chosen" if i == coning.chosen else "as good" if i in coning.rivals else "",
+                f"{candidate.frequency:.4f}",
+                f"{1.0 / candidate.frequency:.4f}",
+                f"{1.0 / candidate.sequence_frequency:.4f}",
+                f"{candidate.inertia_ratio:.3f}",
+                f"{candidate.power:.4f}",
+                "-" if residual < 0.0 else f"{1e6 * residual:.3g}",
+            ]
         )
     return table
 

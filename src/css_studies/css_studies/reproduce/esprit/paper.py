@@ -88,7 +88,7 @@ def _figure_sections(mission: Mission, flight: SpinFlight, legs: Legs, folder: P
     rate = write_rate_figure(flight.passages, folder / "figure_4.png", events)
     angle = write_coning_figure(flight.passages, windows, folder / "figure_5.png", start=57.0)
     spectrum = write_spectrum_figure(flight.passages, windows, folder / "figure_6.png")
-    refusals = [f"{count} cycles: {reason}" for reason, count in flight.reasons.most_common()]
+    refusals = [f"{count} x {reason}" for reason, count in flight.reasons.most_common()]
     return [
         Section(
             "Rate and Sun angle",

@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The frame around every command: its name as it was typed, its help, one line for what is wrong, its exit code."""
+
+import argparse
+import math
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Never
+
+DONE = 0
+FAILED = 1
+USAGE = 2
+INTERRUPTED = 130
+
+_EXITS = {DONE: "done", USAGE: "something asked for is wrong", INTERRUPTED: "interrupted"}
+_RED, _PLAIN = "\x1b[31m", "\x1b[0m"
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Parser whose errors look like every other error of the command."""
+
+    def error(self, message: str) -> Never:
+        """Prints one line, and ends the process."""
+        complain(self.prog, f"{message}; see {self.prog} --help")
+        sys.exit(USAGE)
+
+
+def command_parser(
+    package: str,
+    executable: str,
+    description: str | None,
+    examples: Sequence[str],
+    exits: Mapping[int, str] | None = None,
+    notes: str = "",
+) -> CommandParser:
+    """A parser that is called what the user typed.
+
+    Args:
+        package: ROS package of the command.
+        executable: its name there.
+        description: what it is for, in the lines in which it is to be printed.
+        examples: arguments of calls that work.
+        exits: exit codes with a meaning of their own, beside or in the place of the common ones.
+        notes: printed after the options.
+    """
+    prog = typed_name(package, executable)
+    shown = "\n".join(f"  {prog} {arguments}".rstrip() for arguments in examples)
+    codes = "\n".join(f"  {code:3d}  {meaning}" for code, meaning in sorted({**_EXITS, **(exits or {})}.items()))
+    epilog = "\n\n".join(part for part in (notes.strip(), f"examples:\n{shown}", f"exit codes:\n{codes}") if part)
+    return CommandParser(
+        prog=prog, description=description, epilog=epilog, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+
+
+def typed_name(package: str, executable: str) -> str:
+    """How a command was started: `./sunpoint VERB`, which leaves its word in the environment, or `ros2 run`."""
+    verb, _, of = os.environ.get("SUNPOINT_VERB", "").partition(":")
+    # a command that another one starts inherits the environment, but the word is not its own
+    return f"./sunpoint {verb}" if verb and of == executable else f"ros2 run {package} {executable}"
+
+
+def complain(prog: str, message: object, kind: str = "error") -> None:
+    """One line on standard error: the command's own name, what kind of news it is, and the news."""
+    heading = f"{short_name(prog)}: {kind}:"
+    if sys.stderr.isatty() and not os.environ.get("NO_COLOR"):
+        heading = f"{_RED}{heading}{_PLAIN}"
+    print(heading, message, file=sys.stderr, flush=True)
+
+
+def short_name(prog: str) -> str:
+    """`record` of `./sunpoint record`, `recorder` of `ros2 run css_recording recorder`."""
+    words = prog.split()
+    skipped = 3 if words[:2] == ["ros2", "run"] else 1 if words[0] == "./sunpoint" else 0
+    return " ".join(words[skipped:])
+
+
+def guarded(
+    prog: str,
+    command: Callable[[], int],
+    wrong: tuple[type[Exception], ...],
+    failed: tuple[type[Exception], ...] = (),
+    interrupted: str = "interrupted",
+) -> int:
+    """Runs a command; the errors that it expects become one line each.
+
+    Args:
+        prog: name of the command as its parser has it.
+        command: does the work and gives an exit code.
+        wrong: errors in what the user gave: exit code 2.
+        failed: errors in what came of it: exit code 1.
+        interrupted: what Ctrl-C is answered with; exit code 130.
+    """
+    try:
+        return command()
+    except failed as error:
+        complain(prog, error)
+        return FAILED
+    except wrong as error:
+        complain(prog, error)
+        return USAGE
+    except KeyboardInterrupt:
+        print(f"{short_name(prog)}: {interrupted}", file=sys.stderr, flush=True)
+        return INTERRUPTED
+
+
+def number(expected: str, accepts: Callable[[float], bool]) -> Callable[[str], float]:
+    """Type of an option that takes a number; not-a-number is none, and what is refused is said with what is right.
+
+    Args:
+        expected: what is right, for instance "a number above 0".
+        accepts: whether a number is.
+    """
+
+    def parse(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if math.isnan(value) or not accepts(value):
+            raise argparse.ArgumentTypeError(f"{text} given, expected {expected}")
+        return value
+
+    return parse
+
+
+positive = number("a number above 0", lambda value: 0.0 < value < math.inf)
+"""Type of an option: a finite number above zero."""
