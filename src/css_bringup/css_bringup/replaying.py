@@ -30,7 +30,7 @@ class ReplayResult:
         replayed: one entry an estimator.
         runs: figures of merit, in the same order.
         rejected: messages refused at the edge, by topic and kind.
-        reports: one line for each kind of refusal.
+        reports: what is to be known of the recording, and one line for each kind of refusal.
         simulated_s: time span of the recording [s].
         wall_s: wall time of reading and stepping [s].
         cpu_s: processor time of the same [s].
@@ -118,6 +118,7 @@ def replay(
             cpu_s = stepping.run(writer)
         wall_s = time.perf_counter() - wall
         simulated_s = reader.duration_ns * 1e-9
+        notes = [*reader.notes, *map(str, reader.refused)]
     log = read_flight(bag)
     runs = [_named(run, figures) for run, figures in _paired(stepping.runs, log)]
     return ReplayResult(
@@ -128,7 +129,7 @@ def replay(
         stepping.runs,
         runs,
         stepping.rejected,
-        stepping.reports,
+        notes + stepping.reports,
         simulated_s,
         wall_s,
         cpu_s,

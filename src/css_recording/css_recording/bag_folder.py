@@ -15,7 +15,11 @@ from css_recording.errors import BagError
 
 def fresh_folder(name: str) -> Path:
     """A folder `bags/NAME_TIME` that does not exist yet, in the project when there is one."""
-    base = places.results("bags") / f"{name}_{datetime.now(UTC):%Y%m%d_%H%M%S}"
+    return free_name(places.results("bags") / f"{name}_{datetime.now(UTC):%Y%m%d_%H%M%S}")
+
+
+def free_name(base: Path) -> Path:
+    """This path, or the same with a number where something has that name."""
     folder, number = base, 1
     while folder.exists():
         number += 1
@@ -63,6 +67,21 @@ def is_being_written(path: Path) -> bool:
         except OSError:
             return False
     return False
+
+
+def place_of(descriptor: int) -> Path | None:
+    """Where an open file is now, however it was renamed; None when it was deleted."""
+    if os.fstat(descriptor).st_nlink == 0:
+        return None
+    return Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+
+
+def is_in_place(descriptor: int, path: Path) -> bool:
+    """Whether an open file is still what is found under its name."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except OSError:
+        return False
 
 
 def write_atomically(path: Path, text: str) -> None:

@@ -92,7 +92,7 @@ def print_replay(result: ReplayResult) -> None:
                 + (f"; {comparison.unmatched} stand on one side only" if comparison.unmatched else "")
             )
     for line in result.reports:
-        console.print(f"refused: {line}", soft_wrap=True)
+        console.print(f"note: {line}", soft_wrap=True)
     rate = result.messages / result.cpu_s if result.cpu_s > 0.0 else 0.0
     console.print(
         f"{result.messages} estimates in {result.wall_s:.1f} s ({rate:.0f} a CPU second): {result.bag}", soft_wrap=True
