@@ -121,7 +121,7 @@ class _CompressedMessages:
     def __init__(self, storage: BagStorage) -> None:
         self._storage = storage
         self.notes = storage.notes
-        self.topics, self.left_out, self.time_span = storage.topics, storage.left_out, storage.time_span
+        self.topics, self.time_span = storage.topics, storage.time_span
         self.metadata, self.close = storage.metadata, storage.close
 
     def messages(self, topics: frozenset[str], start_ns: int, end_ns: int) -> Iterator[StoredMessage]:

@@ -62,9 +62,18 @@ class BagReader:
         self._refused: dict[tuple[str, str], Refused] = {}
         self._conversions: dict[str, Conversion] = {}
         self._type_notes: dict[str, str] = {}  # of the topics whose types were compared
-        recorded = self._storage.topics()
+        everything = self._storage.topics()
+        recorded = [entry for entry in everything if entry.topic.encoding == "cdr"]
+        self._others = {
+            entry.topic.name: f"{self.path}: topic {entry.topic.name} is encoded as '{entry.topic.encoding}'; "
+            "only ROS 2 messages can be read"
+            for entry in everything
+            if entry.topic.encoding != "cdr"
+        }
         self._new_names = {topic.name: names.get(topic.name, topic.name) for topic, _ in recorded}
         try:
+            if self._others and not recorded:
+                raise BagError(next(iter(self._others.values())))
             self._check_renaming(names)
         except BagError:
             self._storage.close()
@@ -83,7 +92,7 @@ class BagReader:
         """What must be known of the recording to trust what is read from it, one text each."""
         recovery = self.description.get("recovery")
         recovered = [f"it was recovered, without {recovery}"] if recovery else []
-        return [*self._storage.notes, *recovered, *filter(None, self._type_notes.values())]
+        return [*self._storage.notes, *self._others.values(), *recovered, *filter(None, self._type_notes.values())]
 
     @property
     def refused(self) -> list[Refused]:
@@ -205,9 +214,8 @@ class BagReader:
         asked = {absolute(topic) for topic in topics}
         unknown = asked - set(self._new_names.values())
         if unknown:
-            why = self._storage.left_out().get(min(unknown))
-            if why:
-                raise BagError(why)
+            if min(unknown) in self._others:
+                raise BagError(self._others[min(unknown)])
             known = ", ".join(sorted(self._new_names.values())) or "none"
             raise BagError(f"{self.path}: no topic {min(unknown)}; the recording has {known}")
         return frozenset(old for old, new in self._new_names.items() if new in asked)

@@ -23,16 +23,13 @@ class TopicCount(NamedTuple):
 
 
 class BagStorage(Protocol):
-    """What the reader needs of a storage; topics by their recorded, absolute names."""
+    """What the reader needs of a storage; topics by their recorded, absolute names, those of other encodings too."""
 
     notes: list[str]
     """What a reader of the recording must know, one text each."""
 
     def topics(self) -> list[TopicCount]:
         """Topics in the order of the recording."""
-
-    def left_out(self) -> dict[str, str]:
-        """Topics that cannot be read and why."""
 
     def time_span(self) -> tuple[int, int]:
         """Log times [ns] of the earliest and the latest message; zeros when there is none."""

@@ -19,21 +19,11 @@ _LOG_TIME = itemgetter(0)
 _LAST_NS = (1 << 63) - 1
 
 
-def topic_of(file: McapFile, channel_id: int, hashes: Mapping[str, str] | None = None) -> Topic:
-    """Topic of a channel, with its definition as recorded; `BagError` when it cannot be a ROS 2 topic.
+def recorded_topic(file: McapFile, channel_id: int, hashes: Mapping[str, str] | None = None) -> Topic:
+    """Topic of a channel in any encoding, with its definition as recorded; `BagError` when it has no type.
 
     hashes: of types by topic, for channels that do not say.
     """
-    topic = recorded_topic(file, channel_id, hashes)
-    if topic.encoding != "cdr":
-        raise BagError(
-            f"{file.path}: topic {topic.name} is encoded as '{topic.encoding}'; only ROS 2 messages can be read"
-        )
-    return topic
-
-
-def recorded_topic(file: McapFile, channel_id: int, hashes: Mapping[str, str] | None = None) -> Topic:
-    """Topic of a channel in any encoding; `BagError` when it has no type."""
     channel = file.channels[channel_id]
     schema = file.schemas.get(channel.schema_id)
     if schema is None:
@@ -63,17 +53,13 @@ class McapStorage:
         self._cleanup = cleanup
         self._files: list[McapFile] = []
         self._topics: list[dict[int, Topic]] = []  # of each file, by channel
-        self._left_out: dict[str, str] = {}
         for path in paths:
             file = McapFile(path)
             cleanup.callback(file.close)
             self._files.append(file)
             self._check(file)
             self._topics.append(self._topics_of(file, hashes))
-        if self._left_out and not any(self._topics):
-            raise BagError(next(iter(self._left_out.values())))
         self._counts = self._counted()
-        self.notes += self._left_out.values()
         if not all(file.has_check_sum for file in self._files):
             self.notes.append(NO_CHECK_SUM)
 
@@ -95,10 +81,6 @@ class McapStorage:
             if strange:
                 self.notes.append(f"{strange} messages are of channels that it does not define, and left out")
         return counts
-
-    def left_out(self) -> dict[str, str]:
-        """Topics that cannot be read and why."""
-        return dict(self._left_out)
 
     def time_span(self) -> tuple[int, int]:
         """Log times [ns] of the earliest and the latest message; zeros when there is none."""
@@ -159,9 +141,9 @@ class McapStorage:
         topics = {}
         for number in sorted(file.channels):
             try:
-                topics[number] = topic_of(file, number, hashes)
+                topics[number] = recorded_topic(file, number, hashes)
             except BagError as error:
-                self._left_out[absolute(file.channels[number].topic)] = str(error)
+                self.notes.append(str(error))
         return topics
 
     def _chunked(

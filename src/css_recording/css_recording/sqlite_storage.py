@@ -39,22 +39,17 @@ class SqliteStorage:
         self._cleanup = cleanup
         self._hashes = hashes
         self._readers: list[Reader] = []
-        self._left_out: dict[str, str] = {}
         for path in paths:
             try:
                 self._readers.append(cleanup.enter_context(Reader(self._whole(path))))
             except _ERRORS as error:
                 raise BagError(f"{path}: cannot be read as an SQLite recording: {error}") from error
         self._topics = self._find_topics()
-        self.notes += [*self._left_out.values(), _NO_CHECK_SUM]
+        self.notes.append(_NO_CHECK_SUM)
 
     def topics(self) -> list[TopicCount]:
         """Topics in the order of the recording."""
         return list(self._topics.values())
-
-    def left_out(self) -> dict[str, str]:
-        """Topics that cannot be read and why."""
-        return dict(self._left_out)
 
     def time_span(self) -> tuple[int, int]:
         """Log times [ns] of the earliest and the latest message; zeros when there is none."""
@@ -95,11 +90,6 @@ class SqliteStorage:
         topics: dict[str, TopicCount] = {}
         for connection in (c for reader in self._readers for c in reader.connections):
             topic = self._topic_of(connection)
-            if topic.encoding != "cdr":
-                self._left_out[topic.name] = (
-                    f"{self._bag}: topic {topic.name} is encoded as '{topic.encoding}'; only ROS 2 messages can be read"
-                )
-                continue
             before = topics.get(topic.name, TopicCount(topic, 0))
             if before.topic.type != topic.type:
                 raise BagError(f"{self._bag}: topic {topic.name} has two types")
@@ -138,7 +128,7 @@ class SqliteStorage:
         expected = _frames_of(log) if log else 0
         with closing(sqlite3.connect(path)) as database:
             database.execute("SELECT count(*) FROM sqlite_master").fetchone()  # rolls a journal back
-            _, merged, _ = database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+            _, merged, _ = database.execute("PRAGMA wal_checkpoint(FULL)").fetchone()
             database.execute("PRAGMA journal_mode=DELETE").fetchone()
         if log is None:
             self.notes.append(f"{path.name}: a change that its recorder had begun was taken back")
