@@ -9,7 +9,7 @@ from typing import Any
 
 import zstandard
 
-from css_recording.bag_metadata import METADATA_FILE, METADATA_VERSION, read_metadata, recorded_hashes
+from css_recording.bag_metadata import METADATA_FILE, METADATA_VERSION, read_metadata, recorded_hashes, recovery_note
 from css_recording.bag_storage import BagStorage, StoredMessage, TopicCount, unfinished
 from css_recording.errors import BagError
 from css_recording.mcap_chunk import MAX_CHUNK_BYTES
@@ -62,6 +62,8 @@ def _open_folder(path: Path, cleanup: ExitStack) -> BagStorage:
         notes.append(f"{METADATA_FILE} does not name {', '.join(others)}: left out")
     storage = open_files(path, files, recorded_hashes(information), notes, cleanup)
     storage.notes += doubts(information, storage.topics())
+    if recovery_note(information):
+        storage.notes.append(f"it was recovered, without {recovery_note(information)}")
     return _CompressedMessages(storage) if mode == "message" else storage
 
 

@@ -12,6 +12,8 @@ from css_recording.schemas import MessageSchema
 
 METADATA_FILE = "metadata.yaml"
 METADATA_VERSION = 9
+RECOVERY_NOTE = "recovery"
+"""Text about a recording as a whole: what a recovery could not save."""
 _MOST_BYTES = 4 << 20
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _UNREADABLE = (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError, OverflowError)
@@ -168,6 +170,12 @@ def read_metadata(folder: Path) -> dict[str, Any] | None:
         return information if named and isinstance(information["storage_identifier"], str) else None
     except (OSError, *_UNREADABLE):
         return None
+
+
+def recovery_note(information: Mapping[str, Any]) -> str:
+    """What a recovery could not save, as `metadata.yaml` tells; empty: nothing."""
+    custom = information.get("custom_data")
+    return str(custom.get(RECOVERY_NOTE) or "") if isinstance(custom, dict) else ""
 
 
 def recorded_hashes(information: Mapping[str, Any]) -> dict[str, str]:

@@ -7,7 +7,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from css_recording.bag_files import open_storage
-from css_recording.bag_metadata import absolute
+from css_recording.bag_metadata import RECOVERY_NOTE, absolute
 from css_recording.bag_storage import TopicCount
 from css_recording.bag_writer import FLIGHT_RECORD, LAST_NS, METADATA_RECORD
 from css_recording.errors import BagError
@@ -90,9 +90,11 @@ class BagReader:
     @property
     def notes(self) -> list[str]:
         """What must be known of the recording to trust what is read from it, one text each."""
-        recovery = self.description.get("recovery")
-        recovered = [f"it was recovered, without {recovery}"] if recovery else []
-        return [*self._storage.notes, *self._others.values(), *recovered, *filter(None, self._type_notes.values())]
+        notes = [*self._storage.notes, *self._others.values()]
+        recovery = self.description.get(RECOVERY_NOTE)
+        if recovery and not any(recovery in note for note in notes):
+            notes.append(f"it was recovered, without {recovery}")
+        return [*notes, *filter(None, self._type_notes.values())]
 
     @property
     def refused(self) -> list[Refused]:

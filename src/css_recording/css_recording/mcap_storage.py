@@ -84,11 +84,15 @@ class McapStorage:
 
     def time_span(self) -> tuple[int, int]:
         """Log times [ns] of the earliest and the latest message; zeros when there is none."""
-        spans = [(chunk.start_ns, chunk.end_ns) for file in self._files for chunk in file.chunks]
-        spans += [(loose.log_time, loose.log_time) for file in self._files for loose in file.loose_messages]
-        possible = [(start, min(end, _LAST_NS)) for start, end in spans if start <= _LAST_NS]
-        # a chunk without messages spans from zero to zero
-        spans = [span for span in possible if span != (0, 0)] or possible
+        spans = [
+            (chunk.start_ns, min(chunk.end_ns, _LAST_NS))
+            for file in self._files
+            for chunk in file.chunks
+            # a chunk without messages says that it spans from zero to zero
+            if chunk.start_ns <= _LAST_NS and (chunk.end_ns or file.chunk_messages(chunk))
+        ]
+        loose = [message.log_time for file in self._files for message in file.loose_messages]
+        spans += [(log_time, log_time) for log_time in loose if log_time <= _LAST_NS]
         return (min(start for start, _ in spans), max(end for _, end in spans)) if spans else (0, 0)
 
     def metadata(self) -> list[tuple[str, dict[str, str]]]:

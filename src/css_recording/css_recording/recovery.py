@@ -15,11 +15,13 @@ from css_recording.bag_files import bag_files, doubts, named_files, open_files, 
 from css_recording.bag_folder import is_being_written, sync_folder, write_atomically
 from css_recording.bag_metadata import (
     METADATA_FILE,
+    RECOVERY_NOTE,
     BagSummary,
     FileSummary,
     bag_information,
     metadata_text,
     read_metadata,
+    recovery_note,
     ros_distro,
 )
 from css_recording.bag_storage import BagStorage
@@ -163,28 +165,42 @@ def _reindex(source: Path, paths: list[Path], report: RecoveryReport) -> Recover
         report.was_complete = not wrong and not report.rewritten
         if wrong:
             report.notes += [f"{reason}; written anew" for reason in wrong]
-            try:
-                write_atomically(source / METADATA_FILE, metadata_text(_information(paths, storage)))
-            except OSError as error:
-                raise BagError(f"{source}: cannot write {METADATA_FILE}: {error.strerror}; use -o") from error
-        elif report.rewritten and source.is_dir():
-            write_atomically(source / METADATA_FILE, metadata_text(_information(paths, storage)))
+        if wrong or (report.rewritten and source.is_dir()):
+            _write_metadata(source, metadata_text(_information(source, paths, storage)))
     return report
+
+
+def _write_metadata(source: Path, text: str) -> None:
+    try:
+        write_atomically(source / METADATA_FILE, text)
+    except OSError as error:
+        raise BagError(
+            f"{source}: cannot write {METADATA_FILE}: {error.strerror}; make room, or name an output on another disk"
+        ) from error
+
+
+def _named(source: Path) -> list[str]:
+    return named_files(read_metadata(source) or {"relative_file_paths": []})
 
 
 def _wrong_metadata(source: Path, paths: list[Path], storage: BagStorage) -> list[str]:
     information = read_metadata(source)
     if information is None:
         return [f"{METADATA_FILE} was missing or could not be read"]
-    names = [path.name for path in paths]
-    gone = [name for name in named_files(information) if name not in names]
-    found = [f"{METADATA_FILE} named {name}, which is not there" for name in gone]
-    new = [name for name in names if name not in named_files(information)]
+    found = [f"{METADATA_FILE} named {name}, which is not there" for name in _gone(source, paths)]
+    new = [path.name for path in paths if path.name not in named_files(information)]
     found += [f"{METADATA_FILE} did not name {name}" for name in new]
     return found + doubts(information, storage.topics())
 
 
-def _information(paths: list[Path], storage: BagStorage) -> dict[str, object]:
+def _gone(source: Path, paths: list[Path]) -> list[str]:
+    """Files that `metadata.yaml` names and that are not there."""
+    information = read_metadata(source)
+    names = {path.name for path in paths}
+    return [name for name in named_files(information) if name not in names] if information else []
+
+
+def _information(source: Path, paths: list[Path], storage: BagStorage) -> dict[str, object]:
     """Contents of a new `metadata.yaml`."""
     summaries = []
     for path in paths:
@@ -194,8 +210,15 @@ def _information(paths: list[Path], storage: BagStorage) -> dict[str, object]:
     entries = storage.topics()
     hashes = [entry.topic.schema.type_hash if entry.topic.schema else "" for entry in entries]
     notes: dict[str, str] = {}
-    for name, values in storage.metadata():
-        notes |= {key: value for key, value in values.items() if name == FLIGHT_RECORD and key != SEAL}
+    losses: list[str] = [recovery_note(read_metadata(source) or {})]
+    for values in (values for name, values in storage.metadata() if name == FLIGHT_RECORD):
+        notes |= {key: value for key, value in values.items() if key != SEAL}
+        losses.append(values.get(RECOVERY_NOTE, ""))
+    if len(_gone(source, paths)) > len([path for path in paths if path.name not in _named(source)]):
+        losses += [f"{name}, which was not there" for name in _gone(source, paths)]
+    losses = list(dict.fromkeys(filter(None, losses)))
+    if losses:
+        notes[RECOVERY_NOTE] = "; ".join(losses)
     kind = "sqlite3" if paths[0].suffix == ".db3" else "mcap"
     summary = BagSummary(summaries, [entry.count for entry in entries], ros_distro(), notes, kind)
     return bag_information([entry.topic for entry in entries], hashes, summary)

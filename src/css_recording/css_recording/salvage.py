@@ -9,7 +9,7 @@ from pathlib import Path
 
 from mcap.records import Attachment, Metadata
 
-from css_recording.bag_metadata import Topic
+from css_recording.bag_metadata import RECOVERY_NOTE, Topic
 from css_recording.bag_storage import BagStorage
 from css_recording.bag_writer import LAST_NS, BagWriter
 from css_recording.errors import BagError
@@ -130,7 +130,7 @@ def _create(source: Path, folder: Path, topics: Iterable[Topic], file_name: str 
 def _finish(writer: BagWriter, report: RecoveryReport, torn: list[str]) -> None:
     """Close a recording, and keep in it what was lost: whoever reads it later must know."""
     lost = [f"{name} had no end: up to a second may be missing" for name in torn] + report.losses
-    writer.close({"recovery": "; ".join(lost)} if lost else None)
+    writer.close({RECOVERY_NOTE: "; ".join(lost)} if lost else None)
 
 
 def _given_up(source: Path, folder: Path, error: BagError) -> BagError:

@@ -69,6 +69,24 @@ def test_the_torn_file_of_a_split_recording_is_mended_and_the_others_are_left(fl
     assert (split / "split_3.mcap").stat().st_mtime_ns == before
 
 
+def test_a_file_that_is_gone_is_remembered_by_the_recording(flight, split):
+    recover(split)
+    (split / "split_4.mcap").unlink()
+    with pytest.raises(BagError, match=r"names split_4\.mcap, which is not there"):
+        BagReader(split)
+    report = recover(split)
+    assert "metadata.yaml named split_4.mcap, which is not there; written anew" in report.notes
+    messages, notes = read(split)
+    assert notes == ["it was recovered, without split_4.mcap, which was not there"]
+    assert set(messages) < set(flight.messages(STEPS)) and len(messages) == 3 * STEPS - 7
+    assert recover(split).was_complete
+    (split / "split_5.mcap").unlink()
+    recover(split)
+    assert read(split)[1] == [
+        "it was recovered, without split_4.mcap, which was not there; split_5.mcap, which was not there"
+    ]
+
+
 def test_a_renamed_file_is_found_again(flight, tmp_path):
     folder = flight.record(tmp_path / "bag", STEPS)
     (folder / "bag_0.mcap").rename(folder / "other.mcap")
