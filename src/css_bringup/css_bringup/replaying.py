@@ -35,7 +35,7 @@ class ReplayResult:
         runs: figures of merit, in the same order.
         rejected: messages refused at the edge, by topic and kind.
         missing: readings that counted as missing, by topic, field and kind.
-        reports: one line for each kind of refusal.
+        reports: what is to be known of the recording, and one line for each kind of refusal.
         elsewhere: what differs between the software of the flight and this one; empty: nothing.
         simulated_s: time from the first to the last stamp that was replayed [s].
         wall_s: wall time of reading and stepping [s].
@@ -153,6 +153,7 @@ def replay(
             cpu_s = stepping.run(writer)
         wall_s = time.perf_counter() - wall
         elsewhere = software_apart(reader.description)
+        notes = [*reader.notes, *map(str, reader.refused)]
     log = read_flight(bag)
     runs = [_named(run, figures) for run, figures in _paired(stepping.runs, log)]
     return ReplayResult(
@@ -164,7 +165,7 @@ def replay(
         runs,
         stepping.rejected,
         stepping.missing,
-        stepping.reports,
+        notes + stepping.reports,
         elsewhere,
         (stepping.last_ns - stepping.first_ns) * 1e-9,
         wall_s,

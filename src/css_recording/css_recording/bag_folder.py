@@ -71,6 +71,21 @@ def is_being_written(path: Path) -> bool:
     return False
 
 
+def place_of(descriptor: int) -> Path | None:
+    """Where an open file is now, however it was renamed; None when it was deleted."""
+    if os.fstat(descriptor).st_nlink == 0:
+        return None
+    return Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+
+
+def is_in_place(descriptor: int, path: Path) -> bool:
+    """Whether an open file is still what is found under its name."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except OSError:
+        return False
+
+
 def write_atomically(path: Path, text: str) -> None:
     """Write a text file so that, whatever happens, it has its old contents or the new ones."""
     temporary = _temporary(path)
