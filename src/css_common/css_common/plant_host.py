@@ -179,11 +179,14 @@ class PlantNode(ComponentNode):
             self._go_to(self.mission.epoch_ns, outgoing)
 
     def _rivals(self) -> list[tuple[str, Writer]]:
-        """Other writers of what this node alone should write."""
+        """Other writers of what this node alone should write, where its listeners might take one for it."""
         rivals: list[tuple[str, Writer]] = []
+        own_name = self.get_fully_qualified_name()
         for *_, topic in self._output_ports.values():
             writers = writers_of(self, topic)
-            others = [writer for writer in writers if writer.node != self.get_fully_qualified_name()]
+            others = [writer for writer in writers if writer.node != own_name]
+            if self.mission.values.io.writers == "graph" and len(writers) - len(others) < 2:
+                continue  # no listener mistakes another node for this one
             rivals += [(topic, writer) for writer in others or writers[1:]]
         return rivals
 
