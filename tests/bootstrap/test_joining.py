@@ -6,7 +6,7 @@ import os
 import pytest
 
 from bootstrap import cli, joining
-from bootstrap.joining import Wish, join, split_wish
+from bootstrap.joining import Wish, split_wish
 from bootstrap.project import Refusal
 from css_common.domains import JOINED, Holder, own
 from css_common.network import NetworkError
@@ -16,13 +16,16 @@ SPIN = Holder(23, 500, "flight", "spin", "2026-01-01T00:00:00+00:00")
 STRANGER = Holder(31, 600, "", "python3 fly")
 
 
+def join(environ, wish, must_choose=True):
+    return joining.join(environ, wish, must_choose=must_choose)
+
+
 @pytest.fixture
 def running(monkeypatch):
     """Lets flights run."""
 
     def run(*flights):
         monkeypatch.setattr(joining, "flights", lambda: list(flights))
-        monkeypatch.setattr(joining, "holder_of", {flight.domain: flight for flight in flights}.get)
 
     run()
     return run
@@ -55,14 +58,32 @@ def test_one_of_several_is_named(running, wanted):
 
 
 def test_several_are_listed(running):
-    running(SPIN, STRANGER)
+    running(SPIN, TUMBLE)
     with pytest.raises(Refusal, match=r"2 flights are running, choose with --flight NAME\|PID or --d") as refusal:
         join({}, Wish())
     assert refusal.value.exit_code == 2
-    assert refusal.value.remedy.splitlines() == [f"domain 23: {SPIN}", "  domain 31: process python3 fly (pid 600)"]
-    with pytest.raises(Refusal, match="no flight 'tumble' is running") as refusal:
-        join({}, Wish(flight="tumble"))
+    assert refusal.value.remedy.splitlines() == [f"domain 23: {SPIN}", f"  domain 17: {TUMBLE}"]
+    with pytest.raises(Refusal, match="no flight 'walk' is running") as refusal:
+        join({}, Wish(flight="walk"))
     assert "domain 23" in refusal.value.remedy
+
+
+def test_a_shell_opens_among_several_and_lists_them(running):
+    running(SPIN, TUMBLE)
+    env, said = join({"HOME": "/me"}, Wish(), must_choose=False)
+    assert env == {"HOME": "/me"}
+    assert said.splitlines() == [
+        "ROS domain 0: 2 flights are running, choose with --flight NAME|PID or --domain N",
+        f"  domain 23: {SPIN}",
+        f"  domain 17: {TUMBLE}",
+    ]
+
+
+def test_another_users_flight_is_joined_by_name_alone(running):
+    running(STRANGER)
+    assert join({}, Wish()) == ({}, "ROS domain 0: no flight is running")
+    env, said = join({}, Wish(flight="600"))
+    assert (env["ROS_DOMAIN_ID"], said) == ("31", "ROS domain 31: joining process python3 fly (pid 600)")
 
 
 def test_a_shell_stays_with_its_flight_and_finds_the_next(running):

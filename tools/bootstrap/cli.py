@@ -117,7 +117,7 @@ def _join(verb: str, env: dict[str, str], arguments: list[str]) -> tuple[dict[st
     from bootstrap.joining import join, split_wish
 
     wish, arguments = split_wish(arguments, before_words=verb == "shell")
-    env, why = join(env, wish)
+    env, why = join(env, wish, must_choose=verb != "shell")
     _say(why)
     return env, arguments
 

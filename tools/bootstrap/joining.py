@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from bootstrap.project import Refusal
-from css_common.domains import JOINED, Holder, flights, holder_of
+from css_common.domains import JOINED, Holder, flights
 from css_common.network import DOMAIN, domain_number, domain_of
 
 
@@ -48,11 +48,16 @@ def split_wish(arguments: list[str], *, before_words: bool) -> tuple[Wish, list[
     return Wish(**found), rest
 
 
-def join(environ: Mapping[str, str], wish: Wish) -> tuple[dict[str, str], str]:
-    """The environment in which the verb finds its flight, and one line that says which ROS domain that is and why.
+def join(environ: Mapping[str, str], wish: Wish, *, must_choose: bool) -> tuple[dict[str, str], str]:
+    """The environment in which the verb finds its flight, and what says which ROS domain that is and why.
+
+    Args:
+        environ: as the verb would have it.
+        wish: what the command line asks for.
+        must_choose: of several flights one must be named; a shell is good for more than a flight.
 
     Raises:
-        Refusal: several flights are running, or none of the name.
+        Refusal: several flights are running and one must be chosen, or none is of the name.
         NetworkError: a number is none of a domain.
     """
     env = dict(environ)
@@ -65,11 +70,14 @@ def join(environ: Mapping[str, str], wish: Wish) -> tuple[dict[str, str], str]:
     if given is not None and str(given) != joined:
         return env, f"ROS domain {given}: ROS_DOMAIN_ID"
     env.pop(DOMAIN, None)
-    if given is not None and (flight := holder_of(given)):
-        return _enter_flight(env, flight)
-    running = flights()
+    running = [flight for flight in flights() if flight.kind]  # another user's is joined by name alone
+    for flight in running:
+        if flight.domain == given:
+            return _enter_flight(env, flight)
     if not running:
         return env, "ROS domain 0: no flight is running"
+    if len(running) > 1 and not must_choose:
+        return env, f"ROS domain 0: {_several(running)}\n  {_listed(running)}"
     return _enter_flight(env, _chosen("", running))
 
 
@@ -79,8 +87,11 @@ def _chosen(wanted: str, running: list[Holder]) -> Holder:
         return matching[0]
     if not matching:
         raise Refusal(f"no flight '{wanted}' is running", _listed(running), exit_code=2)
-    problem = f"{len(matching)} flights are running, choose with --flight NAME|PID or --domain N"
-    raise Refusal(problem, _listed(matching), exit_code=2)
+    raise Refusal(_several(matching), _listed(matching), exit_code=2)
+
+
+def _several(running: list[Holder]) -> str:
+    return f"{len(running)} flights are running, choose with --flight NAME|PID or --domain N"
 
 
 def _listed(running: list[Holder]) -> str:

@@ -112,7 +112,12 @@ class Child:
         if self.process is not None and self.process.poll() is None and not self.asked_to_end:
             self.asked_to_end = True
             self.process.send_signal(signal.SIGINT)
-            self.process.send_signal(signal.SIGCONT)  # one that is stopped would not hear it
+            self.wake()
+
+    def wake(self) -> None:
+        """Lets the process go on if a signal has stopped it: it neither answers nor hears that it is to end."""
+        if self.process is not None and self.process.poll() is None:
+            self.process.send_signal(signal.SIGCONT)
 
     def stop(self, limit: float) -> None:
         """Asks the process to end, and insists after `limit` seconds."""

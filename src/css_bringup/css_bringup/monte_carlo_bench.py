@@ -8,7 +8,6 @@ all of them, and medians compared.
 
 import argparse
 import json
-import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -24,6 +23,7 @@ from css_bringup.json_process import MeasurementError, number, run_for_object
 from css_bringup.options import console, whole_number
 from css_bringup.processes import executable_path
 from css_bringup.report import print_json
+from css_common import places
 from css_common.mission import load_mission
 from css_studies.readable_table import ReadableTable
 
@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> None:
     """
     mission = load_mission(MISSION, [f"mission.duration={arguments.duration}"])
     monte_carlo = executable_path("css_studies", "monte_carlo")
-    basilisk = Basilisk(Path(os.environ.get("SUNPOINT_HOME", ".")).absolute())
+    basilisk = Basilisk(places.home().absolute())
     if not basilisk.installed:
         with console.status(f"installing Basilisk {basilisk.version} in {basilisk.folder} (130 MB to download, once)"):
             basilisk.install()

@@ -187,6 +187,8 @@ class Supervisor:
 
     def stop(self) -> None:
         """Ends all processes: the plant first, whose last stamp the others answer, and the recorder last."""
+        for child in self._all():
+            child.wake()
         self.plant.stop(_END_LIMIT)
         for child in self.children.values():
             child.interrupt()

@@ -10,8 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from css_bringup import warden
+from css_bringup import processes, warden
 from css_bringup.child import Child, Pulse
+from css_bringup.processes import Supervisor
+from css_common.mission import load_mission
 
 SUPERVISED = """
 import time
@@ -162,3 +164,40 @@ def test_the_warden_wakes_what_is_stopped_kills_what_hangs_and_tidies_up(tmp_pat
     warden.main(str(folder))
     assert (hanging.wait(), stopped.wait()) == (-signal.SIGKILL, -signal.SIGINT)
     assert not folder.exists()
+
+
+class Clock:
+    """Time as the supervisor sees it."""
+
+    now = 100.0
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+class Watched:
+    """Notes after which times the supervisor looked."""
+
+    def __init__(self) -> None:
+        self.looks: list[float] = []
+
+    def look(self, elapsed_s: float) -> None:
+        self.looks.append(elapsed_s)
+
+    def frozen(self, stopped_limit_s: float, silent_limit_s: float) -> str:
+        return (
+            "no sign of life"
+            if (stopped_limit_s, silent_limit_s, self.looks[-1]) == (2.0, 15.0, pytest.approx(0.3))
+            else ""
+        )
+
+
+def test_time_for_which_the_supervisor_was_stopped_does_not_count(tmp_path, monkeypatch):
+    clock = Clock()
+    monkeypatch.setattr(processes, "time", clock)
+    supervisor = Supervisor(load_mission("okeefe_2013"), None, tmp_path)
+    watched = supervisor.children["ekf"].pulse = Watched()
+    for step_s, frozen in ((0.1, {}), (0.2, {"ekf": "no sign of life"}), (3600.0, {}), (0.25, {})):
+        clock.now += step_s
+        assert supervisor._frozen() == frozen
+    assert watched.looks == pytest.approx([0.3, 0.5, 0.25])

@@ -3,11 +3,12 @@
 
 import hashlib
 import json
-import os
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from css_common import places
 
 _LIBRARIES = ("css_recording", "css_sim", "css_estimation", "sunpoint_control", "numpy", "numba", "mcap")
 _LOCK_FILE = "requirements.lock"
@@ -26,7 +27,7 @@ def software_versions() -> dict[str, str]:
             entries[name] = version(name)
         except PackageNotFoundError:
             continue
-    lock = Path(os.environ.get("SUNPOINT_HOME", "."), _LOCK_FILE)
+    lock = places.home() / _LOCK_FILE
     if lock.is_file():
         entries["lock_sha256"] = hashlib.sha256(lock.read_bytes()).hexdigest()
     return entries
