@@ -63,7 +63,7 @@ def _open_folder(path: Path, cleanup: ExitStack) -> BagStorage:
     storage = open_files(path, files, recorded_hashes(information), notes, cleanup)
     storage.notes += doubts(information, storage.topics())
     if recovery_note(information):
-        storage.notes.append(f"it was recovered, without {recovery_note(information)}")
+        storage.notes.append(f"it was recovered; lost or in doubt: {recovery_note(information)}")
     return _CompressedMessages(storage) if mode == "message" else storage
 
 

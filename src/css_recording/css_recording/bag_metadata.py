@@ -2,6 +2,7 @@
 """What a rosbag2 folder says of its contents: `metadata.yaml` (version 9) and offered quality of service."""
 
 import os
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +16,8 @@ METADATA_VERSION = 9
 RECOVERY_NOTE = "recovery"
 """Text about a recording as a whole: what a recovery could not save."""
 _MOST_BYTES = 4 << 20
+_DEEPEST = 100
+_BRACKETS = re.compile(r"[\[\]{}]")
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _UNREADABLE = (yaml.YAMLError, KeyError, TypeError, ValueError, RecursionError, OverflowError)
 _INFINITE = {"sec": 9223372036, "nsec": 854775807}
@@ -188,7 +191,18 @@ def recorded_hashes(information: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _load(text: str) -> Any:
+    if _is_too_deep(text):  # the time that a parser takes for it grows with the square of the depth
+        raise ValueError("nested too deeply")
     return yaml.load(text, Loader=_LOADER)
+
+
+def _is_too_deep(text: str) -> bool:
+    depth = 0
+    for bracket in _BRACKETS.findall(text):
+        depth += 1 if bracket in "[{" else -1
+        if depth > _DEEPEST:
+            return True
+    return "- " * _DEEPEST in text or "? " * _DEEPEST in text
 
 
 def _dump(value: Any) -> str:

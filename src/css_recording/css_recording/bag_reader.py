@@ -98,7 +98,7 @@ class BagReader:
         notes = [*self._storage.notes, *self._others.values()]
         recovery = self.description.get(RECOVERY_NOTE)
         if recovery and not any(recovery in note for note in notes):
-            notes.append(f"it was recovered, without {recovery}")
+            notes.append(f"it was recovered; lost or in doubt: {recovery}")
         return [*notes, *filter(None, self._type_notes.values())]
 
     @property

@@ -12,11 +12,14 @@ from typing import Any, NamedTuple
 
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import FieldDesc, Typesdict
+from rosbags.typesys import TypesysError
 from rosbags.typesys.store import Typestore
 
 from css_recording.bag_metadata import Topic
 from css_recording.errors import BagError
 from css_recording.schemas import MessageSchema, full_type_name, schema_of, store_of, types_of
+
+_MOST_FIELDS = 10_000
 
 Conversion = Callable[[bytes], bytes]
 """Makes a message of the installed type of a recorded one; `ConversionError` when the bytes are no message."""
@@ -56,7 +59,11 @@ def match_type(topic: Topic, expected: str) -> TypeMatch:
                 f"{installed.type_hash}; the recording holds no definition by which it could be converted"
             )
         return TypeMatch(f"topic {topic.name}: recorded without hash and definition, taken for the {expected} of here")
-    return _match_definitions(topic.name, recorded, installed)
+    try:
+        return _match_definitions(topic.name, recorded, installed)
+    except (KeyError, ValueError, RecursionError, TypesysError) as error:
+        # a definition that lacks a type that it uses, or goes round in a circle
+        raise BagError(f"topic {topic.name}: the recorded definition of {expected} cannot be understood") from error
 
 
 def _match_definitions(name: str, recorded: MessageSchema, installed: MessageSchema) -> TypeMatch:
@@ -88,6 +95,8 @@ def layout_of(type_name: str, types: Typesdict) -> Layout:
             fields += [(f"{name}.{inner}", text) for inner, text in layout_of(str(kind[1]), types)]
         else:
             fields.append((name, _text_of(kind, types)))
+        if len(fields) > _MOST_FIELDS:
+            raise ValueError("too many fields")
     return fields
 
 

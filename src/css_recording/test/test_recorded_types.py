@@ -26,6 +26,15 @@ def recorded(fields: str, **changes) -> MessageSchema:
     return MessageSchema(CELLS, text, hash_of(CELLS, text))._replace(**changes)
 
 
+def nested(depth: int) -> str:
+    """A definition of a few lines that has twenty fields to the power of its depth."""
+    parts = ["T0 field\n"]
+    for level in range(depth):
+        fields = "".join(f"T{level + 1} f{number}\n" for number in range(20))
+        parts.append(f"{'=' * 80}\nMSG: css_msgs/T{level}\n{fields}")
+    return "".join([*parts, f"{'=' * 80}\nMSG: css_msgs/T{depth}\nbool end\n"])
+
+
 def match(schema: MessageSchema | None, type_name: str = CELLS, expected: str = CELLS):
     return match_type(Topic("/css/voltages", type_name, (), schema), expected)
 
@@ -52,6 +61,13 @@ def test_what_cannot_be_compared_is_said_or_refused():
         match(MessageSchema(CELLS, "", other))
     with pytest.raises(BagError, match="cannot be understood"):
         match(INSTALLED._replace(text="{ % }", type_hash=other))
+    for text in (
+        "std_msgs/Header header\nfloat6t[] voltages\n",  # one flipped bit
+        f"css_msgs/CssVoltages[] again\n{HEADER}",
+        nested(8),
+    ):
+        with pytest.raises(BagError, match="cannot be understood"):
+            match(INSTALLED._replace(text=text, type_hash=other))
     same_fields = match(INSTALLED._replace(text=INSTALLED.text + "\n", type_hash=other))
     assert same_fields.conversion is None and "another hash" in same_fields.note
 

@@ -254,7 +254,7 @@ def test_command_reports_and_exits_as_it_says(small, tmp_path, capsys):
     assert main([str(folder)]) == 0
     printed = capsys.readouterr().out
     assert "recovered, 52 messages" in printed
-    assert "lost: the last" in printed
+    assert "lost or in doubt: the last" in printed
     assert main([str(folder)]) == 0
     assert "was complete, 52 messages" in capsys.readouterr().out
     assert main([str(tmp_path / "nowhere")]) == 2

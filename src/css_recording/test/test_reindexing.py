@@ -77,13 +77,13 @@ def test_a_file_that_is_gone_is_remembered_by_the_recording(flight, split):
     report = recover(split)
     assert "metadata.yaml named split_4.mcap, which is not there; written anew" in report.notes
     messages, notes = read(split)
-    assert notes == ["it was recovered, without split_4.mcap, which was not there"]
+    assert notes == ["it was recovered; lost or in doubt: split_4.mcap, which was not there"]
     assert set(messages) < set(flight.messages(STEPS)) and len(messages) == 3 * STEPS - 7
     assert recover(split).was_complete
     (split / "split_5.mcap").unlink()
     recover(split)
     assert read(split)[1] == [
-        "it was recovered, without split_4.mcap, which was not there; split_5.mcap, which was not there"
+        "it was recovered; lost or in doubt: split_4.mcap, which was not there; split_5.mcap, which was not there"
     ]
 
 

@@ -15,7 +15,7 @@ from mcap.records import Chunk, MessageIndex
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
-from css_recording.bag_metadata import QosProfile, Topic, parse_qos
+from css_recording.bag_metadata import QosProfile, Topic, parse_qos, read_metadata
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.recovery import recover
@@ -193,6 +193,24 @@ def test_notes_made_at_the_end_are_in_the_file_and_in_the_custom_data(flight, tm
     recover(tmp_path / "bag")
     with Reader(tmp_path / "bag") as reader:
         assert reader.storage.metadata.custom == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "[" * 20_000,
+        "{a: " * 20_000,
+        "- " * 20_000,
+        "a: " * 20_000,
+        "!!python/object:os.system x",
+        "\0",
+        "a: 2001-99-99",
+    ],
+)
+def test_metadata_that_are_none_are_taken_for_missing(tmp_path, text):
+    (tmp_path / "metadata.yaml").write_text(text)
+    assert read_metadata(tmp_path) is None
+    assert parse_qos(text) == ()
 
 
 def test_a_bare_file_carries_everything_the_yaml_file_says(recording, information, tmp_path):

@@ -47,7 +47,7 @@ def _summary(report: RecoveryReport) -> str:
     state = "was complete" if report.was_complete else "recovered"
     lines = [f"{report.recording}: {state}, {total} messages"]
     lines += [f"  {count:9d}  {topic}" for topic, count in report.messages.items()]
-    lines += [f"lost: {loss}" for loss in report.losses]
+    lines += [f"lost or in doubt: {loss}" for loss in report.losses]
     lines += [f"note: {note}" for note in report.notes]
     return "\n".join(lines)
 
