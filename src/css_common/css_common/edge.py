@@ -112,14 +112,17 @@ class Edge:
             return None
         refusal = self._refusal(sample)
         if refusal is not None:
+            self._incomplete.clear()
             if refusal[0] == ANSWERED_AGAIN:
                 self.repeated += 1
             else:
                 self._reject(*refusal)
             return None
         self.accepted += 1
-        for check in self._incomplete:
-            check.clear(getattr(sample, check.name))
+        if self._incomplete:
+            for check in self._incomplete:
+                check.clear(getattr(sample, check.name))
+            self._incomplete.clear()
         return sample
 
     def begin_again(self) -> None:
@@ -137,10 +140,11 @@ class Edge:
         bad = self.codec.first_not_finite(self._finite_fields, sample)
         if bad is not None:
             return "not_finite", f"{bad} holds NaN or infinity"
-        if self._checks:
-            self._incomplete = [check for check in self._checks if not check.is_whole(getattr(sample, check.name))]
-            for check in self._incomplete:
-                reason = check.refusal(getattr(sample, check.name))
+        for check in self._checks:
+            values = getattr(sample, check.name)
+            if not check.is_whole(values):
+                self._incomplete.append(check)
+                reason = check.refusal(values)
                 if reason is not None:
                     return "not_finite", reason
         # last, so that a rejected message does not move the clock that its successors are measured by

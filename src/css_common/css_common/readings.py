@@ -69,18 +69,18 @@ class ReadingCheck:
         """
         self.name = name
         self.counts: Counter[str] = Counter()
-        self._readings = readings
         self._topic = topic
         self._report = report
         self._all_readable = typed_call(all_readable)
+        self._smallest, self._largest = readings
 
     def is_whole(self, values: np.ndarray) -> bool:
         """Every element is a reading."""
-        return self._all_readable(values, *self._readings)
+        return self._all_readable(values, self._smallest, self._largest)
 
     def refusal(self, values: np.ndarray) -> str | None:
         """Why an array that is not whole cannot be used at all; None when the elements that are readings can."""
-        smallest, largest = self._readings
+        smallest, largest = self._smallest, self._largest
         if np.any(np.isinf(values)):
             return f"{self.name} holds infinity"
         if not np.any((values >= smallest) & (values <= largest)):
@@ -89,7 +89,7 @@ class ReadingCheck:
 
     def clear(self, values: np.ndarray) -> None:
         """Makes NaN of the elements that are no readings."""
-        smallest, largest = self._readings
+        smallest, largest = self._smallest, self._largest
         given = values.tolist()
         missing, impossible, first = clear_unreadable(values, smallest, largest)
         if missing:
