@@ -142,6 +142,8 @@ class SoleSubscription:
         take = handler.take_data
 
         def take_and_look() -> object:
+            if self._ended or subscription is not self._subscription:
+                return None  # the event was in the executor's queue when the subscription was destroyed
             taken = take()
             self._look()
             return taken
