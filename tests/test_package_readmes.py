@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from css_common.component import INERTIAL
 from css_common.schema import default_values
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.coning import Coning
@@ -64,4 +65,7 @@ def test_topics(kind, shown):
     values = default_values(kind.table(), **shown)
     for port in (*kind.inputs(name, values), *kind.outputs(name, values)):
         package = port.message_type.__module__.split(".")[0]
-        assert rows(readme(kind))[port.topic][1] == f"`{package}/{port.message_type.__name__}`"
+        row = rows(readme(kind))[port.topic]
+        assert row[1] == f"`{package}/{port.message_type.__name__}`"
+        frame_id = values.io.inertial_frame if port.frame == INERTIAL else values.io.body_frame
+        assert f"(`{frame_id}`)" in row[4], port.topic

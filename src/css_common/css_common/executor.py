@@ -10,7 +10,7 @@ builds its wait set anew, which is what costs rclpy most of its time.
 import os
 from collections.abc import Callable
 
-from rclpy._rclpy_pybind11 import RCLError
+from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
@@ -101,6 +101,8 @@ def spin_until(
                 if done():
                     return
                 spin_once(timeout_sec=interval)
+        except InvalidHandle:
+            pass  # something was destroyed while an event of it was in the executor's queue
         except RCLError:
             # what a shutdown in the middle of a wait looks like from inside
             if context.ok():

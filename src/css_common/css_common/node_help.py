@@ -44,7 +44,9 @@ def _topic(port: Input | Output, values: Values, profile: QoSProfile, end: str) 
     further = "; further ones: io.accepted_frames" if isinstance(port, Input) else ""
     yield f"      frame_id: {getattr(values.io, key)} (io.{key}{further})"
     policies = (profile.reliability, profile.durability)
-    yield f"      QoS: {', '.join(policy.name.lower() for policy in policies)}, keep last {profile.depth}; overrides:"
+    adapts = ", less where the first writer offers less" if isinstance(port, Input) else ""
+    words = ", ".join(policy.name.lower() for policy in policies)
+    yield f"      QoS: {words}, keep last {profile.depth}{adapts}; overrides:"
     yield f"      qos_overrides./{port.topic}.{end}.{{{','.join(OVERRIDABLE)}}}"
 
 

@@ -11,6 +11,7 @@ import rclpy
 from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
 
+from css_common.command import FAILED, USAGE, complain
 from css_common.component import Component, Plant
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
@@ -24,8 +25,6 @@ from css_common.schema import ParameterError, nearest, shown
 from css_common.stop_signal import StopSignal
 from css_common.supervised import beat
 
-FAILED = 1
-USAGE_ERROR = 2
 # Wall times [s] at the end: for answers to the last stamp of a plant; for what is on its way to another node, and
 # without any of it after which there is no more.
 _ANSWER_LIMIT = 2.0
@@ -90,7 +89,7 @@ class _Process:
         except REFUSALS as error:
             return self._refuse(explained(error))
         if not node.start():
-            return USAGE_ERROR if node.refused else FAILED
+            return USAGE if node.refused else FAILED
         for remark in _unused_overrides(node):
             node.get_logger().warning(remark)
         self.stop.raises = False
@@ -121,8 +120,8 @@ class _Process:
         return node
 
     def _refuse(self, reason: str) -> int:
-        print(f"{self._executable}: {reason}", file=sys.stderr)
-        return USAGE_ERROR
+        complain(self._executable, reason)
+        return USAGE
 
     def _spin(self, executor: Executor, node: ComponentNode) -> int:
         plant = node if isinstance(node, PlantNode) else None

@@ -353,8 +353,8 @@ def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:
         yield f"spacecraft.inertia: eigenvalue {moments[0]:.6g} given, expected a positive definite matrix"
     elif moments[2] > (moments[0] + moments[1]) * (1.0 + 1e-9):
         yield (
-            f"spacecraft.inertia: principal moments {moments.round(6).tolist()} break the triangle inequality, "
-            "no rigid body has them"
+            f"spacecraft.inertia: principal moments {', '.join(f'{m:.6g}' for m in moments)} break the triangle "
+            "inequality, no rigid body has them"
         )
     length = np.linalg.norm(spacecraft.array_normal)
     if abs(length - 1.0) > 1e-6:

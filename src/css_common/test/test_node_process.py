@@ -99,7 +99,7 @@ def test_help_names_topics_and_parameters_and_starts_nothing(capsys):
 
 
 BAD = {
-    "value": (["-p", "gain:=11.0"], "estimator: gain: 11.0 given, expected at least 0 and at most 10"),
+    "value": (["-p", "gain:=11.0"], "estimator: error: gain: 11.0 given, expected at least 0 and at most 10"),
 }
 
 
@@ -115,31 +115,31 @@ def test_bad_command_lines_end_at_once_with_code_2(start, bad):
 
 LONG = "n" * 300
 BAD_BEFORE_ROS = {
-    "no assignment": (["-p", "gain"], "estimator: -p gain: expected KEY:=VALUE\n"),
-    "no remapping": (["-r", "bad"], "estimator: -r bad: expected -r FROM:=TO, both names of topics, or -r __node"),
-    "no name of a topic": (["-r", "voltages:=1x"], "estimator: -r voltages:=1x: expected -r FROM:=TO, both names of "),
-    "no name of a node": (["-r", "__node:=a-b"], "estimator: -r __node:='a-b': expected at most 100 letters, digits"),
-    "a long name": (["-r", f"__node:={LONG}"], "estimator: -r __node:='nnn"),
-    "no namespace": (["-r", "__ns:=x"], "estimator: -r __ns:='x': expected at most 100 letters, digits and _"),
-    "a long namespace": (["-r", f"__ns:=/{LONG}"], "estimator: -r __ns:='/nnn"),
-    "unknown to ROS": (["-x"], "estimator: -x: unknown after --ros-args\n"),
-    "nothing after a flag": (["--params-file"], "estimator: Couldn't parse trailing --params-file flag"),
-    "unknown to the node": (["--", "--flag"], "estimator: '--flag': unknown, expected --help, --summary FILE or --ros"),
-    "level of the log": (["--log-level", "bogus"], "estimator: Couldn't parse log level: '--log-level bogus'. Error: "),
-    "mixed list": (["-p", "weights:=[1, 2.0]"], "estimator: -p weights:=[1, 2.0]: expected -p KEY:=VALUE, with the "),
-    "wrong type": (["-p", "gain:=3"], "estimator: gain: 3 given, expected a number written with a point, at least 0"),
-    "wrong together": (["-p", "floor:=3.0"], "estimator: floor: 3.0 given, expected at most the gain of 1.0\n"),
-    "wrong type of ROS's own": (["-p", "use_sim_time:=3"], "estimator: Trying to set parameter 'use_sim_time' to '3'"),
+    "no assignment": (["-p", "gain"], "-p gain: expected KEY:=VALUE\n"),
+    "no remapping": (["-r", "bad"], "-r bad: expected -r FROM:=TO, both names of topics, or -r __node"),
+    "no name of a topic": (["-r", "voltages:=1x"], "-r voltages:=1x: expected -r FROM:=TO, both names of "),
+    "no name of a node": (["-r", "__node:=a-b"], "-r __node:='a-b': expected at most 100 letters, digits"),
+    "a long name": (["-r", f"__node:={LONG}"], "-r __node:='nnn"),
+    "no namespace": (["-r", "__ns:=x"], "-r __ns:='x': expected at most 100 letters, digits and _"),
+    "a long namespace": (["-r", f"__ns:=/{LONG}"], "-r __ns:='/nnn"),
+    "unknown to ROS": (["-x"], "-x: unknown after --ros-args\n"),
+    "nothing after a flag": (["--params-file"], "Couldn't parse trailing --params-file flag"),
+    "unknown to the node": (["--", "--flag"], "'--flag': unknown, expected --help, --summary FILE or --ros"),
+    "level of the log": (["--log-level", "bogus"], "Couldn't parse log level: '--log-level bogus'. Error: "),
+    "mixed list": (["-p", "weights:=[1, 2.0]"], "-p weights:=[1, 2.0]: expected -p KEY:=VALUE, with the "),
+    "wrong type": (["-p", "gain:=3"], "gain: 3 given, expected a number written with a point, at least 0"),
+    "wrong together": (["-p", "floor:=3.0"], "floor: 3.0 given, expected at most the gain of 1.0\n"),
+    "wrong type of ROS's own": (["-p", "use_sim_time:=3"], "Trying to set parameter 'use_sim_time' to '3'"),
     "depth of a queue": (
         ["-p", "qos_overrides./voltages.subscription.depth:=-1"],
-        "estimator: qos_overrides./voltages.subscription.depth: -1 given, expected at least 1 and at most 1000000\n",
+        "qos_overrides./voltages.subscription.depth: -1 given, expected at least 1 and at most 1000000\n",
     ),
-    "no file": (["--params-file", "/dev/zero"], "estimator: /dev/zero: cannot be read: expected a regular file\n"),
-    "folder": (["--params-file", "."], "estimator: .: cannot be read: expected a regular file\n"),
-    "name": (["-p", "gian:=1.0"], "estimator: gian: unknown; did you mean gain?\n"),
-    "name for this node": (["-p", "estimator:gian:=1.0"], "estimator: gian: unknown; did you mean gain?\n"),
-    "file": (["--params-file", "missing.yaml"], "estimator: missing.yaml: cannot be read: "),
-    "content": (["--params-file", "bad.yaml"], "estimator: bad.yaml: /**: io.deadlin: unknown; did you mean io.deadl"),
+    "no file": (["--params-file", "/dev/zero"], "/dev/zero: cannot be read: expected a regular file\n"),
+    "folder": (["--params-file", "."], ".: cannot be read: expected a regular file\n"),
+    "name": (["-p", "gian:=1.0"], "gian: unknown; did you mean gain?\n"),
+    "name for this node": (["-p", "estimator:gian:=1.0"], "gian: unknown; did you mean gain?\n"),
+    "file": (["--params-file", "missing.yaml"], "missing.yaml: cannot be read: "),
+    "content": (["--params-file", "bad.yaml"], "bad.yaml: /**: io.deadlin: unknown; did you mean io.deadl"),
 }
 
 
@@ -151,7 +151,7 @@ def test_what_is_refused_at_the_start_ends_with_one_line_and_code_2(bad, tmp_pat
     with StopSignal():  # restores the handlers that the end of the process takes
         assert node_process.main(find_component("testbed", "estimator"), ["--ros-args", *arguments]) == 2
     err = capfd.readouterr().err
-    assert err.startswith(reason)
+    assert err.startswith(f"estimator: error: {reason}")
     assert err.count("\n") == 1
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from css_common.component import INERTIAL
 from css_common.schema import default_values
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
@@ -44,4 +45,7 @@ def test_topics(kind):
     values = default_values(kind.table())
     for output in kind.outputs("x", values):
         package = output.message_type.__module__.split(".")[0]
-        assert rows(README)[output.topic][1] == f"`{package}/{output.message_type.__name__}`"
+        row = rows(README)[output.topic]
+        assert row[1] == f"`{package}/{output.message_type.__name__}`"
+        frame_id = values.io.inertial_frame if output.frame == INERTIAL else values.io.body_frame
+        assert f"(`{frame_id}`)" in row[4], output.topic
