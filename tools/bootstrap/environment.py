@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 from bootstrap.project import Environment, Project, Refusal
 from css_common import places
@@ -102,11 +101,10 @@ def compose(base: Mapping[str, str], environment: Environment) -> dict[str, str]
     for name, entries in environment.prepend.items():
         rest = [part for part in env.get(name, "").split(os.pathsep) if part and part not in entries]
         env[name] = os.pathsep.join([*entries, *rest])
-    logs = Path(environment.assign["SUNPOINT_HOME"], "log")
-    if not {"ROS_HOME", "ROS_LOG_DIR"} <= env.keys() and not places.may_write(logs):
-        logs = places.scratch("log", env)
-    env.setdefault("ROS_HOME", str(logs))
-    env.setdefault("ROS_LOG_DIR", str(logs / "ros"))
+    if not {"ROS_HOME", "ROS_LOG_DIR"} <= env.keys():
+        logs = places.logs(env)
+        env.setdefault("ROS_HOME", str(logs))
+        env.setdefault("ROS_LOG_DIR", str(logs / "ros"))
     env.setdefault("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     env.setdefault("MPLBACKEND", "Agg")
     return env

@@ -66,7 +66,7 @@ def _fly_processes(
 ) -> FlightResult:
     # without a recording, flights of one mission at the same time differ by their domain
     flight = bag.name if bag else f"{mission.name}_domain_{os.environ.get(network.DOMAIN, '0')}"
-    logs = places.results("log") / "flights" / flight
+    logs = places.logs() / "flights" / flight
     status = f"flying {mission.name}, one process per node; logs in {logs}"
     named = 0
 

@@ -59,6 +59,8 @@ def mission_of(arguments: argparse.Namespace) -> Mission:
         # measured by studies, which the packages that read missions know nothing of
         if quantity not in QUANTITIES:
             raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
+    for remark in mission.remarks:
+        complain("warning:", remark)
     last = (mission.steps - 1) * mission.values.mission.period
     for event in mission.events:
         if event.time > last + 1e-9:

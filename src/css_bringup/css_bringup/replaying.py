@@ -8,14 +8,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from css_bringup.replay import EstimatorRequest, Replay, Replayed
+from css_bringup.estimator_request import EstimatorRequest
+from css_bringup.replay import Replay
+from css_bringup.replay_verdict import shortcomings, software_apart
+from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
 from css_common.mission import Mission, default_mission, load_mission, mission_from_text
 from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.provenance import software_versions
-from css_studies.flight_log import FlightLog, read_flight
+from css_studies.flight_log import IMPORTED_FROM, FlightLog, read_flight
 from css_studies.flight_metrics import Run, estimator_runs
 
 
@@ -31,8 +34,10 @@ class ReplayResult:
         replayed: one entry an estimator.
         runs: figures of merit, in the same order.
         rejected: messages refused at the edge, by topic and kind.
-        reports: one line for each kind of refusal.
-        simulated_s: time span of the recording [s].
+        missing: readings that counted as missing, by topic, field and kind.
+        reports: what is to be known of the recording, and one line for each kind of refusal.
+        elsewhere: what differs between the software of the flight and this one; empty: nothing.
+        simulated_s: time from the first to the last stamp that was replayed [s].
         wall_s: wall time of reading and stepping [s].
         cpu_s: processor time of the same [s].
     """
@@ -44,7 +49,9 @@ class ReplayResult:
     replayed: list[Replayed]
     runs: list[Run]
     rejected: Mapping[str, Mapping[str, int]]
+    missing: Mapping[str, Mapping[str, int]]
     reports: list[str]
+    elsewhere: str
     simulated_s: float
     wall_s: float
     cpu_s: float
@@ -54,8 +61,13 @@ class ReplayResult:
         """Estimates written."""
         return sum(run.messages for run in self.replayed)
 
+    @property
+    def shortcomings(self) -> list[str]:
+        """What keeps the replay from being a success, one line each."""
+        return [line for run in self.replayed for line in shortcomings(run, self.elsewhere)]
+
     def result_object(self) -> dict[str, Any]:
-        """What `--json` prints: the keys of a flight, and whether bytes are as they flew."""
+        """What `--json` prints: the keys of a flight, and for each estimator what it gave and how that compares."""
         common = result_object(
             self.mission,
             self.runs,
@@ -66,7 +78,14 @@ class ReplayResult:
             recorded=self.messages,
             lost=0,
         )
-        return common | {"rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()}}
+        return common | {
+            "parameters": self.mission.origin,
+            "software_differs": self.elsewhere or None,
+            "replayed": [_replayed_object(run) for run in self.replayed],
+            "shortcomings": self.shortcomings,
+            "rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()},
+            "missing_readings": {topic: dict(kinds) for topic, kinds in self.missing.items()},
+        }
 
 
 def default_replay(source: Path, *, overwrite: bool = False) -> Path:
@@ -105,6 +124,7 @@ def replay(
     requests: Iterable[EstimatorRequest],
     remap: Mapping[str, str],
     *,
+    overrides: Iterable[str] = (),
     overwrite: bool = False,
 ) -> ReplayResult:
     """Replays a recording through estimators into a new recording.
@@ -115,6 +135,7 @@ def replay(
         mission: parameters of the estimators.
         requests: which estimators.
         remap: new names of the recording's topics.
+        overrides: KEY=VALUE that were asked for in `mission`; what changed in flight does not touch them.
         overwrite: replace a recording that is there.
 
     Raises:
@@ -122,14 +143,17 @@ def replay(
         BagError: a recording cannot be read or written.
     """
     with BagReader(source, remap) as reader:
-        stepping = Replay(reader, mission, requests)
+        stepping = Replay(reader, mission, requests, overrides)
         metadata = {"mission": mission.text(), "replay_of": str(source), **software_versions()}
+        if IMPORTED_FROM in reader.description:
+            metadata[IMPORTED_FROM] = reader.description[IMPORTED_FROM]
         metadata["estimators"] = json.dumps({run.label: dict(run.node.canonical) for run in stepping.runs})
         wall = time.perf_counter()
         with BagWriter(bag, metadata=metadata, overwrite=overwrite) as writer:
             cpu_s = stepping.run(writer)
         wall_s = time.perf_counter() - wall
-        simulated_s = reader.duration_ns * 1e-9
+        elsewhere = software_apart(reader.description)
+        notes = [*reader.notes, *map(str, reader.refused)]
     log = read_flight(bag)
     runs = [_named(run, figures) for run, figures in _paired(stepping.runs, log)]
     return ReplayResult(
@@ -140,8 +164,10 @@ def replay(
         stepping.runs,
         runs,
         stepping.rejected,
-        stepping.reports,
-        simulated_s,
+        stepping.missing,
+        notes + stepping.reports,
+        elsewhere,
+        (stepping.last_ns - stepping.first_ns) * 1e-9,
         wall_s,
         cpu_s,
     )
@@ -159,6 +185,18 @@ def _named(run: Replayed, figures: Run) -> Run:
         "estimator": ":".join(filter(None, (run.node.name, run.changed))),
         "gyro": "on" if use_gyro in (True, None) else "off",
         "flown": run.comparison is not None,
-        "topic": next(topic for topic, _ in run.outputs.values()),
+        "topic": next(iter(run.topics.values())),
         "identical": run.comparison.identical if run.comparison is not None else None,
+    }
+
+
+def _replayed_object(run: Replayed) -> dict[str, Any]:
+    return {
+        "label": run.label,
+        "estimates": run.messages,
+        "failures": run.failures,
+        "unmatched_inputs": run.matcher.unmatched,
+        "missing_inputs": run.matcher.complaints(),
+        "comparison": run.comparison.as_object() if run.comparison is not None else None,
+        "notes": run.notes,
     }

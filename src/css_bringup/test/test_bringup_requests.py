@@ -192,5 +192,5 @@ def test_json_result_has_the_documented_keys(tmp_path):
     result = FlightResult(load_mission("okeefe_2013"), bag=tmp_path)
     assert list(json.loads(json.dumps(flight_object(result, [])))) == [
         "mission", "case", "seed", "simulated_s", "wall_s", "cpu_s", "realtime_factor",
-        "messages_recorded", "messages_lost", "bag", "runs",
+        "messages_recorded", "messages_lost", "bag", "runs", "domain", "failure", "incidents",
     ]  # fmt: skip

@@ -6,12 +6,13 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from css_common.codec import Sample
 from css_common.epochs import parse_utc
+from css_common.readings import Readings
 from css_common.schema import Table, Values
 from css_common.sections import SECTIONS
 
@@ -32,6 +33,10 @@ class Input:
         lengths: expected length of array fields; another length is refused at the edge.
         used: fields that the component reads and that must be finite; empty: all. Drivers leave NaN in others.
         frame: whose frame_id is expected, `BODY` or `INERTIAL`.
+        readings: array fields whose elements may each be missing (NaN), and what the others may be; an element beyond
+            that becomes NaN, a message without any reading is refused.
+        heeded: False while the values make nothing of it (a gyro that is not to be used): its messages are then
+            neither waited for nor handed over, whatever they are. May change when values do.
     """
 
     key: str
@@ -42,6 +47,8 @@ class Input:
     lengths: Mapping[str, int] = field(default_factory=dict)
     used: tuple[str, ...] = ()
     frame: str = BODY
+    readings: Mapping[str, Readings] = field(default_factory=dict)
+    heeded: bool = True
 
 
 @dataclass(frozen=True)
@@ -71,16 +78,6 @@ Received = Mapping[str, Any]
 """Input key to `Sample`; None for an optional input that is silent and for one that is not due."""
 Outgoing = Mapping[str, Sample | tuple[Sample, ...]]
 """Output key to its message of the step, or to those of an output of events."""
-
-
-def messages_of(outgoing: Outgoing) -> Iterator[tuple[str, Sample]]:
-    """Each message that a component gave, with the key of its output."""
-    for key, given in outgoing.items():
-        if isinstance(given, tuple):
-            for sample in given:
-                yield key, sample
-        else:
-            yield key, given
 
 
 def _unheard(text: str) -> None:

@@ -5,10 +5,11 @@ Shared by live nodes and replay. Rejections are counted by kind; the first of ea
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from css_common.codec import DecodeError, Sample, codec_of
-from css_common.component import INERTIAL, Component, Input
+from css_common.component import INERTIAL, Input
+from css_common.readings import ReadingCheck
 from css_common.schema import Values
 
 Report = Callable[[str], None]
@@ -20,8 +21,6 @@ ANSWERED_AGAIN = "answered_again"
 
 _CONFIRMATIONS = 3
 CONFIRMATIONS_BACK = 10
-_MOST_PENDING = 64
-_NEVER = -(2**63)
 
 
 class StampGuard:
@@ -94,8 +93,15 @@ class Edge:
         # a message that is due less often than that must not count as one from another time
         largest_gap = max(io.largest_gap, 2.0 * values.mission.period * source.divider)
         self.guard = StampGuard(round(largest_gap * 1e9))
-        self._finite_fields = self.codec.real_fields(source.used)
+        self._finite_fields = [f for f in self.codec.real_fields(source.used) if f.name not in source.readings]
+        self._checks = [ReadingCheck(source.topic, name, may_be, report) for name, may_be in source.readings.items()]
+        self._incomplete: list[ReadingCheck] = []
         self._report = report
+
+    @property
+    def missing(self) -> dict[str, int]:
+        """Elements of arrays that counted as missing, by field and kind."""
+        return {f"{check.name}.{kind}": count for check in self._checks for kind, count in check.counts.items()}
 
     def accept(self, data: bytes) -> Sample | None:
         """The message in `data`, or None when it was rejected."""
@@ -112,6 +118,8 @@ class Edge:
                 self._reject(*refusal)
             return None
         self.accepted += 1
+        for check in self._incomplete:
+            check.clear(getattr(sample, check.name))
         return sample
 
     def begin_again(self) -> None:
@@ -129,6 +137,12 @@ class Edge:
         bad = self.codec.first_not_finite(self._finite_fields, sample)
         if bad is not None:
             return "not_finite", f"{bad} holds NaN or infinity"
+        if self._checks:
+            self._incomplete = [check for check in self._checks if not check.is_whole(getattr(sample, check.name))]
+            for check in self._incomplete:
+                reason = check.refusal(getattr(sample, check.name))
+                if reason is not None:
+                    return "not_finite", reason
         # last, so that a rejected message does not move the clock that its successors are measured by
         refusal = self.guard.refusal(sample.stamp_ns)
         if refusal is not None:
@@ -139,126 +153,3 @@ class Edge:
         self.rejected[kind] += 1
         if self.rejected[kind] == 1:
             self._report(f"{self.source.topic}: {kind}: {detail} (further ones are counted, not reported)")
-
-
-class Matcher:
-    """Brings the inputs of one cycle together by their stamps.
-
-    Attributes:
-        unmatched: messages that no cycle used.
-        set_back: how often time went back and the component began anew.
-    """
-
-    def __init__(self, component: Component, inputs: Iterable[Input], awaited: Iterable[str]) -> None:
-        """Prepares the matching.
-
-        Args:
-            component: whose steps decide which inputs are due, and which begins anew when time goes back.
-            inputs: all inputs; the first one paces the cycle when matching by the latest.
-            awaited: keys without which an exact cycle does not run (required ones, and optional ones that
-                have a publisher).
-        """
-        self.inputs = {i.key: i for i in inputs}
-        self.awaited = frozenset(awaited)
-        self.exact = component.values.io.input_matching == "exact"
-        self.deadline_ns = round(component.values.io.deadline * 1e9)
-        self.unmatched = 0
-        self.set_back = 0
-        self._pacing = next(iter(self.inputs), None)
-        self._component = component
-        self._divided = any(i.divider > 1 for i in self.inputs.values())
-        self._speaking = self.awaited  # without optional inputs that let a deadline pass
-        self._pending: dict[int, dict[str, Sample]] = {}
-        self._latest: dict[str, Sample] = {}
-        self._newest: dict[str, int] = {}
-        self._done = _NEVER
-
-    def offer(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
-        """Takes a message; returns the cycles that are now complete, oldest first."""
-        if not self.exact:
-            return self._offer_latest(key, sample)
-        stamp = sample.stamp_ns
-        went_back = stamp < self._newest.get(key, _NEVER)
-        self._newest[key] = stamp
-        if key in self.awaited and key not in self._speaking:
-            self._speaking |= {key}
-        if stamp <= self._done:
-            # The edge lets a sender's stamps go back only when its clock was set back. Stamps behind those of the
-            # others are late, or come from a clock that never agreed with theirs: neither may stop the cycle.
-            if not went_back or self._done - stamp < self.deadline_ns:
-                self.unmatched += 1
-                return []
-            self._begin_anew()
-        slots = self._pending.setdefault(stamp, {})
-        slots[key] = sample
-        if not slots.keys() >= self._due(stamp):
-            if len(self._pending) > _MOST_PENDING:
-                # the one that waits longest; by stamp, leftovers of a time ahead would push out every new one
-                self.unmatched += len(self._pending.pop(next(iter(self._pending))))
-            return []
-        return [self._complete(stamp)]
-
-    def overdue(self) -> list[tuple[int, dict[str, Sample | None]]]:
-        """Cycles that wait for optional inputs alone, oldest first; called at a deadline.
-
-        What is silent now is not waited for again until it speaks: a dead gyro costs one deadline, not one a cycle.
-        """
-        ready = []
-        for stamp in sorted(self._pending):
-            slots = self._pending.get(stamp)
-            missing = self._due(stamp) - slots.keys() if slots is not None else frozenset()
-            if slots is not None and not any(self.inputs[key].required for key in missing):
-                self._speaking -= missing
-                ready.append(self._complete(stamp))
-        return ready
-
-    def oldest_pending(self) -> int | None:
-        """Stamp of the oldest incomplete cycle."""
-        return min(self._pending, default=None)
-
-    def missing(self) -> list[str]:
-        """Topics that the oldest incomplete cycle still waits for; of all cycles when there is none."""
-        if not self._pending:
-            return [i.topic for i in self.inputs.values() if i.key in self.awaited]
-        oldest = min(self._pending)
-        missing = self._due(oldest) - self._pending[oldest].keys()
-        return [i.topic for i in self.inputs.values() if i.key in missing]
-
-    def _begin_anew(self) -> None:
-        self._pending.clear()
-        self._latest.clear()
-        self._done = _NEVER
-        self.set_back += 1
-        self._component.configure()
-
-    def _due(self, stamp: int) -> frozenset[str]:
-        if not self._divided:
-            return self._speaking
-        step = self._component.step_of(stamp)
-        return frozenset(key for key in self._speaking if step % self.inputs[key].divider == 0)
-
-    def _complete(self, stamp: int) -> tuple[int, dict[str, Sample | None]]:
-        slots = self._pending.pop(stamp)
-        for older in [s for s in self._pending if s < stamp]:
-            self.unmatched += len(self._pending.pop(older))
-        self._done = stamp
-        return stamp, {key: slots.get(key) for key in self.inputs}
-
-    def _offer_latest(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
-        self._latest[key] = sample
-        if key != self._pacing:
-            return []
-        stamp = sample.stamp_ns
-        if stamp <= self._done:  # as the edge found, the clock was set back
-            self._begin_anew()
-            self._latest[key] = sample
-        received = {}
-        for name, entry in self.inputs.items():
-            held = self._latest.get(name)
-            fresh = held is not None and abs(stamp - held.stamp_ns) <= self.deadline_ns
-            if entry.required and not fresh:
-                self.unmatched += 1
-                return []
-            received[name] = held if fresh else None
-        self._done = stamp
-        return [(stamp, received)]

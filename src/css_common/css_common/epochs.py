@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Instants as integer nanoseconds of UTC since 1970, the clock of every ROS stamp."""
 
+import re
 from datetime import UTC, datetime, timedelta
+
+from css_common.schema import shown
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -15,7 +18,8 @@ def parse_utc(text: str) -> int:
     try:
         instant = datetime.fromisoformat(text)
     except ValueError as error:
-        raise ValueError(f"{text!r} is not a UTC instant such as 2013-06-01T00:00:00Z") from error
+        leap = "; ROS stamps know no leap second" if re.search(r"[0-9]:60(?![0-9])", text) else ""
+        raise ValueError(f"{shown(text)} is not a UTC instant such as 2013-06-01T00:00:00Z{leap}") from error
     if instant.tzinfo is None:
         instant = instant.replace(tzinfo=UTC)
     return (instant - _EPOCH) // timedelta(microseconds=1) * 1000

@@ -6,6 +6,7 @@ component; what only the node that owns simulated time does is in `css_common.pl
 """
 
 import contextlib
+import copy
 import time
 import traceback
 from collections import Counter
@@ -24,15 +25,18 @@ from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.timer import Timer
 
-from css_common import ros_parameters, sections
+from css_common import ros_parameters
 from css_common.codec import Sample, codec_of
-from css_common.component import Component, Outgoing, Output, Plant, messages_of
+from css_common.component import Component, Outgoing, Output, Plant
 from css_common.diagnostics import Diagnostics, Health
-from css_common.edge import Edge, Matcher
+from css_common.edge import Edge
+from css_common.matching import Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
-from css_common.schema import ParameterError, Values, shaped_values
+from css_common.rcl_errors import endpoint
+from css_common.schema import ParameterError, Values
 from css_common.sole_subscription import SoleSubscription
+from css_common.stepping import Stepper, conflict
 from css_common.writers import writer_choice
 
 REJECTED = ".rejected."
@@ -94,8 +98,9 @@ class ComponentNode(LifecycleNode):
         super().__init__(name, context=context, use_global_arguments=use_global_arguments)
         self.mission = mission
         self.component_type = component_type
-        # component and matcher exist from configure to clean-up, and only then do messages and timers come in
+        # component, stepper and matcher exist from configure to clean-up, and only then do messages and timers come in
         self.component: Component = None  # type: ignore[assignment]
+        self.stepper: Stepper = None  # type: ignore[assignment]
         self.counters: Counter[str] = Counter()
         self.edges: dict[str, Edge] = {}
         self.matcher: Matcher = None  # type: ignore[assignment]
@@ -103,9 +108,13 @@ class ComponentNode(LifecycleNode):
         self._canonical = self._declare()
         self._output_ports: dict[str, tuple] = {}
         self.subscriptions_made: list[SoleSubscription] = []
-        self._events: list[Event] = []
-        self._is_active = False
+        self.refused = ""
+        self._unanswered: tuple[int, dict[str, Sample | None]] | None = None
+        self._forgiven: Counter[str] = Counter()  # failures before the last start, which are none of this one's
         self._seen_errors: set[str] = set()
+        self._performing = False
+        self._waiting_stamp: int | None = None
+        self._unmet_reported = False
         self._last_stamp = 0
         self._began: tuple[float, float] | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -147,12 +156,18 @@ class ComponentNode(LifecycleNode):
         """Goes back to unconfigured after a transition that failed."""
         return self._guarded(self._clean_up)
 
+    @property
+    def _is_active(self) -> bool:
+        return self.stepper is not None and self.stepper.is_active
+
     def _guarded(self, transition) -> TransitionCallbackReturn:
         # rclpy turns an exception in a transition into a silent ERROR
         try:
             transition()
         except ParameterError as error:
-            self.get_logger().error(str(error))
+            self.refused = str(error)
+            self.get_logger().error(self.refused)
+            self._clean_up()  # a transition that is refused leads to no error state, which would do that
             return _FAILURE
         except Exception:
             if self.context.ok():  # else a signal has ended ROS under it, and that is no news
@@ -181,11 +196,10 @@ class ComponentNode(LifecycleNode):
         return ros_parameters.declare(self, self._table, node.canonical)
 
     def _configure(self) -> None:
-        reason = self._conflict(self._canonical)
-        if reason:
-            raise ParameterError(reason)
+        self.check()
         name = self.get_name()
-        self.component = self.component_type(name, shaped_values(self._table, self._canonical))
+        self.stepper = self._stepper(name)
+        self.component = self.stepper.component
         self.component.report = self.get_logger().info
         values = self.component.values
         inputs = self.component_type.inputs(name, values)
@@ -193,26 +207,37 @@ class ComponentNode(LifecycleNode):
         published = self.mission.topics
         awaited = [i.key for i in inputs if i.required or i.topic in published]
         self.matcher = Matcher(self.component, inputs, awaited)
-        self._events = [e for e in self.mission.events if e.node == name]
+        self.stepper.tuned = self.matcher.retune
         for output in self.component_type.outputs(name, values):
-            self._output_ports[output.key] = self._create_output(output)
+            with endpoint(output.topic):
+                self._output_ports[output.key] = self._create_output(output)
         for source in inputs:
             edge = Edge(source, values, self.get_logger().warning)
             self.edges[source.key] = edge
             receive = partial(self._receive, source.key, edge)
-            self._subscribe(source.message_type, source.topic, receive, edge.begin_again)
+            with endpoint(source.topic):
+                self._subscribe(source.message_type, source.topic, receive, edge.begin_again)
         if self.mission.values.lockstep.realtime_factor > 0.0 and any(not i.required for i in inputs):
             self._deadline_timer = self.create_timer(values.io.deadline, self._run_overdue, clock=self._steady)
+
+    def check(self) -> None:
+        """Looks whether the parameters fit together.
+
+        Raises:
+            ParameterError: they do not.
+        """
+        reason = self._conflict(self._canonical)
+        if reason:
+            raise ParameterError(reason)
 
     def _create_output(self, output: Output) -> tuple:
         publisher = self.create_publisher(
             output.message_type,
             output.topic,
-            LOOP_PUBLISHER,
+            copy.copy(LOOP_PUBLISHER),  # rclpy writes overrides into the profile that it is given
             qos_overriding_options=_OVERRIDES,
         )
-        codec = codec_of(output.message_type)
-        return publisher, codec, codec.real_fields(), output.topic
+        return publisher, output.topic
 
     def _subscribe(
         self, message_type: type, topic: str, callback: Callable[[bytes], None], on_hand_over=lambda: None
@@ -231,17 +256,17 @@ class ComponentNode(LifecycleNode):
         )
 
     def _activate(self) -> None:
-        if self.counters["deactivated"] > self.counters["reactivated"]:
+        if self.stepper.activate():
             self.counters["reactivated"] += 1
-            self.component.configure()
-        self._is_active = True
+        unanswered, self._unanswered = self._unanswered, None
+        if unanswered is not None:
+            self._run(*unanswered)
 
     def _deactivate(self) -> None:
-        self._is_active = False
+        self.stepper.deactivate()
         self.counters["deactivated"] += 1
 
     def _clean_up(self) -> None:
-        self._is_active = False
         self.stop_listening()
         for publisher, *_ in self._output_ports.values():
             self.destroy_publisher(publisher)
@@ -250,7 +275,10 @@ class ComponentNode(LifecycleNode):
             self._deadline_timer = None
         self._output_ports.clear()
         self.edges.clear()
-        self.component = self.matcher = None  # type: ignore[assignment]
+        self.component = self.stepper = self.matcher = None  # type: ignore[assignment]
+        self._overdue_stamp = self._unanswered = None
+        self._forgiven = Counter(self.counters)
+        self._seen_errors.clear()
 
     def stop_listening(self) -> None:
         """Ends all subscriptions; to be called while the executor still has the node."""
@@ -292,6 +320,8 @@ class ComponentNode(LifecycleNode):
     # Messages
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        if self.edges.get(key) is not edge:  # was under way when the node was cleaned up
+            return
         sample = edge.accept(data)
         if sample is None:
             return
@@ -304,6 +334,8 @@ class ComponentNode(LifecycleNode):
             self._run(stamp_ns, received)
 
     def _run_overdue(self) -> None:
+        if self.matcher is None:  # a firing that was under way when the node was cleaned up
+            return
         # Two firings apart: what was pending at the last one and still is has waited a whole deadline.
         waiting = self.matcher.oldest_pending()
         if waiting is not None and waiting == self._overdue_stamp:
@@ -316,26 +348,28 @@ class ComponentNode(LifecycleNode):
         self._last_stamp = stamp_ns
         if self._began is None:
             self._mark_begin()
-        component = self.component
         # An exception that leaves a callback ends the process, so whatever a component does wrong ends here.
         try:
-            if self._events:
-                self._apply_events(stamp_ns)
-            self._publish((component.cycle if self._is_active else component.idle)(stamp_ns, received))
+            outgoing = self.stepper.step(stamp_ns, received)
+            if not self._is_active:
+                self._unanswered = None if outgoing or not self._awaited_in_lockstep() else (stamp_ns, received)
+            self._publish(outgoing)
         except Exception as error:
             self._report_failure(error)
         else:
             self.counters["cycles"] += 1
 
+    def _awaited_in_lockstep(self) -> bool:
+        """Whether simulated time may stand still for this node: what it leaves out it then has to make up for."""
+        return self.mission.plant is not None and self.mission.values.lockstep.realtime_factor == 0.0
+
     def _publish(self, outgoing: Outgoing) -> None:
-        for key, sample in messages_of(outgoing):
-            publisher, codec, real_fields, topic = self._output_ports[key]
-            bad = codec.first_not_finite(real_fields, sample)
-            if bad is not None:
-                self.counters["withheld_not_finite"] += 1
-                self._report_once(f"{topic}: {bad} is not finite, message withheld")
-                continue
-            publisher.publish(codec.encode(sample))
+        for port, sample in self.stepper.checked(outgoing):
+            self._output_ports[port.key][0].publish(port.codec.encode(sample))
+
+    def _withhold(self, topic: str, field: str) -> None:
+        self.counters["withheld_not_finite"] += 1
+        self._report_once(f"{topic}: {field} is not finite, message withheld")
 
     def _report_failure(self, error: Exception) -> None:
         self.counters["cycle_failed"] += 1
@@ -347,40 +381,50 @@ class ComponentNode(LifecycleNode):
             self._seen_errors.add(text)
             self.get_logger().error(text + " (further ones are counted, not reported)")
 
-    def _apply_events(self, stamp_ns: int) -> None:
-        elapsed = (stamp_ns - self.mission.epoch_ns) / 1e9
-        while self._events and elapsed >= self._events[0].time - 1e-9:
-            event = self._events.pop(0)
-            self.get_logger().info(f"event {event.name} at {event.time:g} s: {event.action} {event.parameter}".rstrip())
-            if event.action == "set":
-                (result,) = self.set_parameters([RosParameter(event.parameter, value=event.value)])
-                if not result.successful:
-                    self.counters["events_refused"] += 1
-                    self.get_logger().error(f"event {event.name}: {result.reason}")
-            elif event.action == "deactivate" and self._is_active:
-                self.trigger_deactivate()
-            elif event.action == "activate" and not self._is_active:
-                self.trigger_activate()
+    def _stepper(self, name: str) -> Stepper:
+        mission = self.mission
+        stepper = Stepper(self.component_type, name, self._canonical, mission.events, mission.epoch_ns)
+        stepper.is_active = False
+        stepper.perform = self._perform
+        stepper.failed = self._report_failure
+        stepper.withheld = self._withhold
+        return stepper
+
+    def _perform(self, event: Event) -> None:
+        """Does what a scripted event says, by the same ways as an operator."""
+        self._performing = True
+        try:
+            self._do(event)
+        finally:
+            self._performing = False
+
+    def _do(self, event: Event) -> None:
+        self.get_logger().info(f"event {event.name} at {event.time:g} s: {event.action} {event.parameter}".rstrip())
+        if event.action == "set":
+            (result,) = self.set_parameters([RosParameter(event.parameter, value=event.value)])
+            if not result.successful:
+                self.counters["events_refused"] += 1
+                self.get_logger().error(f"event {event.name}: {result.reason}")
+        elif event.action == "deactivate" and self._is_active:
+            self.trigger_deactivate()
+        elif event.action == "activate" and not self._is_active:
+            self._unanswered = None  # the step of the event follows
+            self.trigger_activate()
 
     # Parameters
 
     def _conflict(self, canonical: dict) -> str | None:
-        values = shaped_values(self._table, canonical)
-        for reason in (*sections.conflicts(values), *self.component_type.conflicts(values)):
-            return reason
-        return None
+        return conflict(self.component_type, canonical)
 
     def _tune(self, canonical: dict) -> None:
-        if self.component is None:
+        if self.stepper is None:
             return
-        values = shaped_values(self._table, canonical)
-        self.matcher.deadline_ns = round(values.io.deadline * 1e9)
+        self.stepper.tune(canonical)
         if self._deadline_timer is not None:
             self._deadline_timer.timer_period_ns = self.matcher.deadline_ns
-        try:
-            self.component.tune(values)
-        except Exception as error:
-            self._report_failure(error)
+        if not self._performing:  # else a cycle is under way, and the next ones come after it
+            for stamp_ns, received in self.matcher.released():
+                self._run(stamp_ns, received)
 
     # Health
 
@@ -392,17 +436,37 @@ class ComponentNode(LifecycleNode):
             counters[f"{key}.repeated"] = edge.repeated
             for kind, count in edge.rejected.items():
                 counters[f"{key}{REJECTED}{kind}"] = count
+            for kind, count in edge.missing.items():
+                counters[f"{key}.{kind}"] = count
         for subscription in self.subscriptions_made:
             for node, count in subscription.refused.items():
                 counters[f"{subscription.topic}{STRANGER}{node}"] = count
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
-        if self.counters["cycle_failed"] or self.counters["withheld_not_finite"]:
+        if any(self.counters[kind] > self._forgiven[kind] for kind in ("cycle_failed", "withheld_not_finite")):
             return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
         if any(edge.rejected for edge in self.edges.values()):
             return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
         if any(subscription.refused for subscription in self.subscriptions_made):
             return Health(DiagnosticStatus.WARN, "other nodes write its topics too", counters, self._last_stamp)
+        unmet = self._unmet()
+        if unmet:
+            return Health(DiagnosticStatus.WARN, unmet, counters, self._last_stamp)
         state = "active" if self._is_active else "inactive"
         return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)
+
+    def _unmet(self) -> str:
+        """Which messages did not come, for cycles that did not run or have waited since the last look; warns once."""
+        if self.matcher is None:
+            return ""
+        lines = self.matcher.complaints()
+        waiting = self.matcher.oldest_pending()
+        if waiting is not None and waiting == self._waiting_stamp:
+            lines.append(f"stamp {waiting} ns waits for {', '.join(self.matcher.missing())}")
+        self._waiting_stamp = waiting
+        text = "; ".join(lines)
+        if text and not self._unmet_reported:
+            self._unmet_reported = True
+            self.get_logger().warning(f"{text} (what follows is in /diagnostics)")
+        return text

@@ -6,10 +6,6 @@ Shared sections stand under `/**`, node parameters under the node's name. The fi
 nobody declares, so each reader checks the whole file here first and a typo dies everywhere.
 """
 
-import importlib
-import math
-import os
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -21,33 +17,50 @@ from css_common import sections
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant
 from css_common.epochs import parse_utc
-from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
+from css_common.mission_file import MissionError, dump_sections, flattened, read_sections, read_text
+from css_common.mission_lookup import find_mission
+from css_common.mission_script import Event, criteria_of, events_of
+from css_common.node_files import find_component, parse_node_entry
+from css_common.parameter_sections import (
+    SHARED,
+    Sections,
+    given_to,
+    is_for,
+    is_shared,
+    shared_by_all,
+    with_own,
+    with_shared,
+)
 from css_common.schema import (
     Parameter,
     ParameterError,
+    Table,
     Values,
     checked_values,
+    flag,
     shaped_values,
+    shown,
     unknown_name,
 )
 
-SHARED = "/**"
+__all__ = [
+    "SHARED",
+    "Event",
+    "Mission",
+    "MissionError",
+    "Node",
+    "default_mission",
+    "find_component",
+    "find_mission",
+    "load_mission",
+    "mission_from_text",
+]
+
 _SHARED_TABLE = tuple(p for table in sections.SECTIONS.values() for p in table)
 _SHARED_NAMES = {p.name: p for p in _SHARED_TABLE}
-_EVENT_KEYS = {"time", "node", "action", "parameter", "value"}
-_ACTIONS = ("activate", "deactivate", "set")
-
-
-@dataclass(frozen=True)
-class Event:
-    """A scripted change at a simulated time."""
-
-    name: str
-    time: float
-    node: str
-    action: str
-    parameter: str = ""
-    value: Any = None
+_SCRIPTS = ("events.", "criteria.")
+_OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
+_MOST_NODES = 64
 
 
 @dataclass(frozen=True)
@@ -73,32 +86,46 @@ class Node:
 
 
 class Mission:
-    """A validated mission. Use `load_mission` or `default_mission`."""
+    """A validated mission. Use `load_mission` or `default_mission`.
 
-    def __init__(self, origin: str, parameters: dict[str, dict[str, Any]]) -> None:
+    Attributes:
+        remarks: what is right but may not be what was meant, one line each.
+    """
+
+    def __init__(
+        self,
+        origin: str,
+        parameters: dict[str, dict[str, Any]],
+        namespace: str = "/",
+        guest: tuple[str, type[Component]] | None = None,
+    ) -> None:
         """Validates all sections.
 
         Args:
             origin: file name for messages.
             parameters: section name to flat parameter names and raw values.
+            namespace: of its nodes.
+            guest: name and component of a node beside the graph, which may have a section, too.
 
         Raises:
             MissionError: naming the file, section, key, value and what was expected.
         """
         self.origin = origin
         self.parameters = parameters
-        shared = {key: value for key, value in parameters.get(SHARED, {}).items() if not belongs_to_ros(key)}
-        self._events_raw = _take(shared, "events.")
-        self._criteria_raw = _take(shared, "criteria.")
+        self.namespace = namespace
+        given = shared_by_all(parameters, namespace)
+        shared = {key: value for key, value in given.items() if key in _SHARED_NAMES}
         with _naming(origin, SHARED):
             self.shared = checked_values(_SHARED_TABLE, shared)
             self.values = shaped_values(_SHARED_TABLE, self.shared)
             _refuse(sections.conflicts(self.values))
-        self._shared_given = shared
         self.nodes = self._build_nodes()
-        self.events = self._build_events()
-        self.criteria = self._build_criteria()
+        tables = {node.name: node.component.table() for node in self.nodes}
+        self._check_keys(tables if guest is None else tables | {guest[0]: guest[1].table()})
+        self.events = events_of(_below("events.", given), tables, f"{origin}: {SHARED}")
+        self.criteria = criteria_of(_below("criteria.", given), f"{origin}: {SHARED}")
         self._check_wiring()
+        self.remarks = tuple(self._unmeant())
 
     @property
     def name(self) -> str:
@@ -187,27 +214,31 @@ class Mission:
         Raises:
             MissionError: a key that no section has, or a value that its specification refuses.
         """
-        parameters = {section: dict(values) for section, values in self.parameters.items()}
+        parameters: Sections = self.parameters
         for override in overrides:
             key, separator, text = override.partition("=")
             if not separator:
-                raise MissionError(f"{override!r} is no override, expected KEY=VALUE")
+                raise MissionError(f"{shown(override)} is no override, expected KEY=VALUE")
             key = key.strip()
-            section, specification = self._find(key)
+            node, specification = self._find(key)
             try:
                 value = replace(specification, name=key).parse(text)  # errors name it as it was typed
             except ParameterError as error:
                 raise MissionError(f"override {error}") from error
-            parameters.setdefault(section, {})[specification.name] = value
-        return Mission(self.origin, parameters)
+            if node is None:
+                parameters = with_shared(parameters, key, value)
+            else:
+                parameters = with_own(parameters, node, specification.name, value)
+        return Mission(self.origin, {name: dict(flat) for name, flat in parameters.items()}, self.namespace)
 
     def text(self) -> str:
         """The mission as a parameter file: what was given, overrides applied."""
         return dump_sections(self.parameters)
 
-    def _find(self, key: str) -> tuple[str, Parameter]:
+    def _find(self, key: str) -> tuple[str | None, Parameter]:
+        """The node that a parameter belongs to, None when all share it, and its specification."""
         if key in _SHARED_NAMES:
-            return SHARED, _SHARED_NAMES[key]
+            return None, _SHARED_NAMES[key]
         head, _, rest = key.partition(".")
         known = [*_SHARED_NAMES]
         for node in self.nodes:
@@ -218,78 +249,58 @@ class Mission:
         raise MissionError(f"override {unknown_name(key, known)}")
 
     def _build_nodes(self) -> tuple[Node, ...]:
+        entries = self.values.graph.nodes
+        if len(entries) > _MOST_NODES:
+            raise MissionError(
+                f"{self.origin}: {SHARED}: graph.nodes: {len(entries)} given, expected at most {_MOST_NODES}"
+            )
         nodes: list[Node] = []
-        for entry in self.values.graph.nodes:
+        for entry in entries:
             package, executable, name = parse_node_entry(entry, self.origin)
             if any(n.name == name for n in nodes):
                 raise MissionError(f"{self.origin}: {SHARED}: graph.nodes: two nodes are called {name}")
             nodes.append(self._node(name, package, executable, find_component(package, executable, self.origin)))
-        known = [n.name for n in nodes]
-        for section in self.parameters:
-            if section != SHARED and section not in known:
-                raise MissionError(
-                    f"{self.origin}: section {unknown_name(section, known)} (sections are {SHARED} and the nodes "
-                    f"of graph.nodes: {', '.join(known)})"
-                )
         return tuple(nodes)
+
+    def _check_keys(self, tables: Mapping[str, Table]) -> None:
+        """Refuses sections that are for no node of the graph, and keys that none of a section's nodes has."""
+        for section, parameters in self.parameters.items():
+            names = [name for name in tables if is_for(section, name, self.namespace)]
+            shared = is_shared(section, self.namespace)
+            if not names and not shared:
+                raise MissionError(
+                    f"{self.origin}: section {unknown_name(section, tables)} (sections are {SHARED} and the nodes "
+                    f"of graph.nodes: {', '.join(tables)})"
+                )
+            known = {p.name: p for name in names for p in tables[name]} | _OF_ROS
+            known |= _SHARED_NAMES if shared else {}
+            for key, value in parameters.items():
+                if key.startswith("qos_overrides.") or (shared and key.startswith(_SCRIPTS)):
+                    continue
+                with _naming(self.origin, section):
+                    if key not in known:
+                        raise ParameterError(unknown_name(key, known))
+                    if key in _OF_ROS:
+                        _OF_ROS[key].check(value)
+
+    def _unmeant(self) -> Iterator[str]:
+        given, period = self.values.mission.duration, self.values.mission.period
+        if abs(given - self.steps * period) > 1e-6 * period:
+            yield (
+                f"mission.duration: {given:.9g} s is no multiple of mission.period {period:.9g} s: "
+                f"{self.steps} steps are flown, {self.steps * period:.9g} s"
+            )
 
     def _node(self, name: str, package: str, executable: str, component: type[Component]) -> Node:
         table = component.table()
         names = {p.name for p in table}
-        given = {key: value for key, value in self._shared_given.items() if key in names}
-        own = self.parameters.get(name, {})
-        given |= {key: value for key, value in own.items() if not belongs_to_ros(key)}
+        given = given_to(self.parameters, name, self.namespace)
         with _naming(self.origin, name):
-            canonical = checked_values(table, given)
+            canonical = checked_values(table, {key: value for key, value in given.items() if key in names})
             values = shaped_values(table, canonical)
             _refuse(sections.conflicts(values))
             _refuse(component.conflicts(values))
         return Node(name, package, executable, component, canonical, values)
-
-    def _build_events(self) -> tuple[Event, ...]:
-        grouped = _grouped(self._events_raw)
-        events = []
-        for name, fields in grouped.items():
-            where = f"{self.origin}: {SHARED}: events.{name}"
-            for key in fields:
-                if key not in _EVENT_KEYS:
-                    raise MissionError(f"{where}.{unknown_name(key, _EVENT_KEYS)}")
-            time, node, action = fields.get("time"), fields.get("node"), fields.get("action")
-            if not isinstance(time, float) or not time >= 0.0:
-                raise MissionError(f"{where}.time: {time!r} given, expected seconds from the epoch, such as 600.0")
-            if action not in _ACTIONS:
-                raise MissionError(f"{where}.action: {action!r} given, expected one of {', '.join(_ACTIONS)}")
-            names = [n.name for n in self.nodes]
-            if node not in names:
-                raise MissionError(f"{where}.node: {unknown_name(str(node), names)}")
-            target = self.node(node)
-            event = Event(name, time, target.name, action, str(fields.get("parameter", "")), fields.get("value"))
-            if action == "set":
-                self._check_set_event(where, target, event)
-            events.append(event)
-        return tuple(sorted(events, key=lambda e: (e.time, e.name)))
-
-    def _check_set_event(self, where: str, target: Node, event: Event) -> None:
-        table = {p.name: p for p in target.component.table()}
-        if event.parameter not in table:
-            raise MissionError(f"{where}.parameter: {unknown_name(event.parameter, table)}")
-        if not table[event.parameter].tunable:
-            raise MissionError(f"{where}.parameter: {event.parameter} cannot change in flight")
-        try:
-            table[event.parameter].check(event.value)
-        except ParameterError as error:
-            raise MissionError(f"{where}.value: {error}") from error
-
-    def _build_criteria(self) -> dict[str, dict[str, float]]:
-        criteria = _grouped(self._criteria_raw)
-        for quantity, limits in criteria.items():
-            for key, value in limits.items():
-                where = f"{self.origin}: {SHARED}: criteria.{quantity}.{key}"
-                if key not in ("min", "max"):
-                    raise MissionError(f"{where}: unknown, expected min or max")
-                if not isinstance(value, float) or not math.isfinite(value):
-                    raise MissionError(f"{where}: {value!r} given, expected a number written with a point")
-        return criteria
 
     def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
         if entry.message_type is not output.message_type:
@@ -353,85 +364,8 @@ def _refuse(conflicts: Iterable[str]) -> None:
         raise ParameterError(conflict)
 
 
-def _take(values: dict[str, Any], prefix: str) -> dict[str, Any]:
-    names = [name for name in values if name.startswith(prefix)]
-    return {name.removeprefix(prefix): values.pop(name) for name in names}
-
-
-def _grouped(flat: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    groups: dict[str, dict[str, Any]] = {}
-    for name, value in flat.items():
-        group, _, key = name.partition(".")
-        groups.setdefault(group, {})[key] = value
-    return groups
-
-
-def belongs_to_ros(name: str) -> bool:
-    """True for parameters that every ROS node has, whoever wrote it: quality-of-service overrides, simulated time."""
-    return name.startswith("qos_overrides.") or name in ("use_sim_time", "start_type_description_service")
-
-
-def parse_node_entry(entry: str, origin: str) -> tuple[str, str, str]:
-    """Package, executable and name of `PACKAGE/EXECUTABLE[:NAME]`.
-
-    Raises:
-        MissionError: the entry has another form.
-    """
-    form = re.fullmatch(r"([A-Za-z]\w*)/([A-Za-z]\w*)(?::([A-Za-z]\w*))?", entry, re.ASCII)
-    if form is None:
-        raise MissionError(f"{origin}: {SHARED}: graph.nodes: {entry!r} given, expected PACKAGE/EXECUTABLE[:NAME]")
-    package, executable, name = form.groups()
-    return package, executable, name or executable
-
-
-def find_component(package: str, executable: str, origin: str = "mission") -> type[Component]:
-    """The component that a node file defines.
-
-    Raises:
-        MissionError: there is no such node file, or it defines no component.
-    """
-    module_name = f"{package}.nodes.{executable}"
-    try:
-        module = importlib.import_module(module_name)
-    except ModuleNotFoundError as error:
-        if error.name and not module_name.startswith(error.name):
-            raise
-        raise MissionError(
-            f"{origin}: {SHARED}: graph.nodes: {package}/{executable}: "
-            f"there is no {module_name.replace('.', '/')}.py in this workspace"
-        ) from error
-    for item in vars(module).values():
-        if isinstance(item, type) and issubclass(item, Component) and item.__module__ == module_name:
-            return item
-    raise MissionError(f"{origin}: {SHARED}: graph.nodes: {module_name} defines no component")
-
-
-def mission_folders() -> Iterator[Path]:
-    """Folders searched for missions by name."""
-    home = os.environ.get("SUNPOINT_HOME")
-    if home:
-        yield Path(home) / "config"
-    yield Path.cwd() / "config"
-    for prefix in filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)):
-        yield Path(prefix).parent.parent / "config"  # install/PACKAGE lies two levels below the workspace
-
-
-def find_mission(name: str) -> Path:
-    """File of a mission given by name or path.
-
-    Raises:
-        MissionError: there is no such file; names what was searched and what exists.
-    """
-    if name.endswith((".yaml", ".yml")) or os.sep in name:
-        if not Path(name).is_file():
-            raise MissionError(f"{name}: no such mission file")
-        return Path(name)
-    known: list[str] = []
-    for folder in mission_folders():
-        if (folder / f"{name}.yaml").is_file():
-            return folder / f"{name}.yaml"
-        known += [p.stem for p in sorted(folder.glob("*.yaml"))]
-    raise MissionError(f"mission {unknown_name(name, known)} (missions: {', '.join(dict.fromkeys(known)) or 'none'})")
+def _below(prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    return {name.removeprefix(prefix): value for name, value in values.items() if name.startswith(prefix)}
 
 
 def load_mission(name: str | Path, overrides: Iterable[str] = ()) -> Mission:
@@ -441,10 +375,7 @@ def load_mission(name: str | Path, overrides: Iterable[str] = ()) -> Mission:
         MissionError: the file is missing, is no parameter file, or anything in it is wrong.
     """
     path = find_mission(str(name))
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise MissionError(f"{path}: cannot be read: {error}") from error
+    text = read_text(path)
     if not any(read_sections(text, str(path)).values()):
         raise MissionError(f"{path}: holds no parameters, expected sections such as {SHARED}: {{ros__parameters: ...}}")
     return mission_from_text(text, str(path), overrides)

@@ -1,119 +1,100 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reading and writing of ROS 2 parameter files, strict where YAML and ROS are silent."""
 
+import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar
+import stat
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 import yaml
+
+from css_common.parameter_document import DocumentError, read_document
+from css_common.parameter_words import Dumper
+
+MOST_BYTES = 4_000_000
+"""Size of a parameter file above which it is something else."""
+
+_PARAMETERS = "ros__parameters"
+_UNPRINTABLE = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
+_SECTION = re.compile(r"/?(\*\*?|[A-Za-z_]\w*)(/(\*\*?|[A-Za-z_]\w*))*", re.ASCII)
 
 
 class MissionError(Exception):
     """A mission that cannot be flown: one line that names file, key, value and what was expected."""
 
     def __init__(self, message: str) -> None:
-        super().__init__(" ".join(message.splitlines()))
+        line = " ".join(message.splitlines())
+        super().__init__(_UNPRINTABLE.sub(lambda found: repr(found[0])[1:-1], line))
 
 
-class _Loader(yaml.SafeLoader):
-    """Reads plain words as ROS does, and refuses what ROS refuses or would take without a word.
+def read_text(path: str | Path) -> str:
+    """The text of a parameter file: UTF-8, or UTF-16 with its mark, which ROS reads as well.
 
-    YAML 1.1 makes an instant of 2013-06-01, 90 of 1:30, a text of 1e-4 and a truth value of the key `off`; the parser
-    of ROS does not. Keys that stand twice are an error.
+    Raises:
+        MissionError: it is no regular file, too large for what it should be, cannot be read or holds no text.
     """
-
-    yaml_implicit_resolvers: ClassVar[dict] = {}  # type: ignore[misc]  # one of the class for PyYAML, too
-    bool_values: ClassVar[dict] = yaml.SafeLoader.bool_values | {"y": True, "n": False}
-
-    def fetch_plain(self) -> None:
-        super().fetch_plain()
-        token = self.tokens[-1]
-        if self.flow_level and ":" in token.value:
-            line = token.start_mark.line + 1
-            raise MissionError(f"line {line}: {token.value} given, expected quotes: ROS reads no colon inside brackets")
-
-    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
-        if self.check_event(yaml.AliasEvent):
-            line = self.peek_event().start_mark.line + 1
-            raise MissionError(f"line {line}: aliases are not read by ROS, expected the values themselves")
-        return super().compose_node(parent, index)
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        keys = set()
-        for key_node, _ in node.value:
-            line = key_node.start_mark.line + 1
-            if not isinstance(key_node, yaml.ScalarNode):
-                raise MissionError(f"line {line}: expected a word as key")
-            key_node.tag = "tag:yaml.org,2002:str"
-            if key_node.value in keys:
-                raise MissionError(f"line {line}: {key_node.value} stands twice")
-            keys.add(key_node.value)
-        return super().construct_mapping(node, deep)
-
-
-class _Dumper(yaml.SafeDumper):
-    """Quotes every text that the loader would read as something else."""
-
-
-def _plain(tag: str, pattern: str, first: Sequence[str]) -> None:
-    expression = re.compile(f"^(?:{pattern})$")
-    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{tag}", expression, list(first))
-    _Dumper.add_implicit_resolver(f"tag:yaml.org,2002:{tag}", expression, list(first))
-
-
-def _integer(loader: _Loader, node: yaml.ScalarNode) -> int:
-    digits = node.value.lower()
-    return int(digits, 16 if "x" in digits else 8 if digits.lstrip("+-").startswith("0") else 10)
-
-
-_Loader.add_constructor("tag:yaml.org,2002:int", _integer)
-_truths = ("y", "yes", "n", "no", "true", "false", "on", "off")
-_plain("bool", "|".join(form for word in _truths for form in (word, word.title(), word.upper())), "yYnNtTfFoO")
-_plain("null", "~|null|Null|NULL|", ["~", "n", "N", ""])
-_plain("int", r"[-+]?(0[xX][0-9a-fA-F]+|0[0-7]*|[1-9]\d*)", "-+0123456789")
-_plain(
-    "float",
-    r"[-+]?(\d+\.?\d*[eE][-+]?\d+|\d+\.\d*|\.\d+([eE][-+]?\d+)?|\.(inf|Inf|INF))|\.(nan|NaN|NAN)",
-    "-+0123456789.",
-)
+    try:
+        status = os.stat(path)
+        if not stat.S_ISREG(status.st_mode):
+            raise MissionError(f"{path}: cannot be read: expected a regular file")
+        if status.st_size > MOST_BYTES:
+            raise MissionError(f"{path}: cannot be read: {status.st_size} bytes, expected at most {MOST_BYTES}")
+        data = Path(path).read_bytes()
+        return data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+    except OSError as error:
+        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:  # bytes that are no text; a name that no file can have
+        raise MissionError(f"{path}: cannot be read: {error}") from error
 
 
 def read_sections(text: str, origin: str) -> dict[str, dict[str, Any]]:
-    """Node name to nested parameters of a parameter file.
+    """Section to nested parameters of a parameter file; namespaces written as maps are part of a section's name.
 
     Raises:
         MissionError: the text is no parameter file.
     """
     try:
-        # SafeLoader subclass: builds plain data only
-        document = yaml.load(text, _Loader)
-    except MissionError as error:
+        document = read_document(text)
+    except DocumentError as error:
         raise MissionError(f"{origin}: {error}") from error
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        raise MissionError(f"{origin}: not valid YAML: {' '.join(str(error).split())}") from error
     if document is None:
         return {}
     if not isinstance(document, Mapping):
         raise MissionError(f"{origin}: expected node names at the top, found {type(document).__name__}")
-    result = {}
-    for name, body in document.items():
-        if not isinstance(body, Mapping) or set(body) != {"ros__parameters"}:
-            raise MissionError(f"{origin}: {name}: expected the one key ros__parameters below it")
-        parameters = body["ros__parameters"]
-        if not isinstance(parameters, Mapping):
-            raise MissionError(f"{origin}: {name}: ros__parameters must hold keys and values")
-        section = name.lstrip("/") if name != "/**" else name
-        if section in result:
-            raise MissionError(f"{origin}: {section} stands twice")
-        _refuse_twice(parameters, f"{origin}: {section}")
-        result[section] = dict(parameters)
+    result: dict[str, dict[str, Any]] = {}
+    seen: set[str] = set()
+    for name, parameters in _sections(document, "", origin):
+        if name.lstrip("/") in seen:
+            raise MissionError(f"{origin}: {name.lstrip('/')} stands twice")
+        _refuse_twice(parameters, f"{origin}: {name}")
+        seen.add(name.lstrip("/"))
+        result[name] = dict(parameters)
     return result
 
 
+def _sections(bodies: Mapping[str, Any], space: str, place: str) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for key, body in bodies.items():
+        name = f"{space}/{key}" if space else key
+        here = place if space else f"{place}: {key}"
+        if not isinstance(body, Mapping) or (_PARAMETERS in body and len(body) > 1):
+            raise MissionError(f"{here}: expected the one key {_PARAMETERS} below it")
+        if _PARAMETERS not in body:
+            yield from _sections(body, name, here)
+            continue
+        if not _SECTION.fullmatch(name):
+            raise MissionError(f"{here}: expected the name of a node, {name!r} is none")
+        parameters = body[_PARAMETERS]
+        if not isinstance(parameters, Mapping):
+            raise MissionError(f"{here}: {_PARAMETERS} must hold keys and values")
+        yield name, parameters
+
+
 def _refuse_twice(parameters: Mapping[str, Any], place: str) -> None:
-    names = [name for name, _ in _leaves(parameters)]
-    for name in names:
-        if names.count(name) > 1:
+    for name, count in Counter(name for name, _ in _leaves(parameters)).items():
+        if count > 1:
             raise MissionError(f"{place}: {name} stands twice, once as a dotted name")
 
 
@@ -132,18 +113,19 @@ def _leaves(nested: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, 
 
 def dump_sections(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     """A parameter file of section names and flat parameters."""
-    document = {
-        section: {"ros__parameters": _nested(flat)} for section, flat in parameters.items() if flat
-    }
-    return yaml.dump(document, Dumper=_Dumper, sort_keys=False, default_flow_style=None, width=110)
+    document = {section: {_PARAMETERS: _nested(flat)} for section, flat in parameters.items() if flat}
+    return yaml.dump(document, Dumper=Dumper, sort_keys=False, default_flow_style=None, width=110)
 
 
 def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
     root: dict[str, Any] = {}
     for name, value in flat.items():
         *path, leaf = name.split(".")
-        at = root
+        at: Any = root
         for part in path:
-            at = at.setdefault(part, {})
-        at[leaf] = value
+            at = at.setdefault(part, {}) if isinstance(at, dict) else None
+        if isinstance(at, dict) and leaf not in at:
+            at[leaf] = value
+        else:  # one name is the beginning of another
+            root[name] = value
     return root

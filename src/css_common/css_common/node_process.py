@@ -4,27 +4,27 @@
 import json
 import sys
 import time
-from collections.abc import Callable
-from itertools import pairwise
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.executors import Executor
 from rclpy.signals import SignalHandlerOptions
 
-from css_common.codec import type_name
 from css_common.component import Component, Plant
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
-from css_common.mission import Mission, belongs_to_ros
-from css_common.mission_file import MissionError, flattened, read_sections
+from css_common.mission import Mission
+from css_common.mission_file import MissionError
+from css_common.node_arguments import mission_of_arguments, parse_arguments
+from css_common.node_help import describe
 from css_common.plant_host import PlantNode
-from css_common.schema import ParameterError, default_values, unknown_name
-from css_common.sections import GRAPH
+from css_common.rcl_errors import REFUSALS, explained, in_own_words
+from css_common.schema import ParameterError, nearest, shown
 from css_common.stop_signal import StopSignal
 from css_common.supervised import beat
 
+FAILED = 1
 USAGE_ERROR = 2
 # Wall times [s] at the end: for answers to the last stamp of a plant; for what is on its way to another node, and
 # without any of it after which there is no more.
@@ -84,21 +84,41 @@ class _Process:
     def run(self, arguments: list[str]) -> int:
         """Starts the node and lets it work; the exit code."""
         try:
-            mission = mission_of_arguments(self._component_type, arguments)
-            # Signals are handled here: rclpy would shut its context down with messages still waiting to be answered,
-            # and an exception that a signal raises in a callback would pass through the executor's C++ frames.
-            rclpy.init(args=[sys.argv[0], *arguments], signal_handler_options=SignalHandlerOptions.NO)
-            self._executor = create_executor()
-            self._node = create_node(self._component_type, self._executable, mission)
+            node = self._create(arguments)
         except (MissionError, ParameterError) as error:
             return self._refuse(str(error))
-        except (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError) as error:
-            return self._refuse(" ".join(str(error).split()))
-        self._executor.add_node(self._node)
-        if not self._node.start():
-            return USAGE_ERROR
+        except REFUSALS as error:
+            return self._refuse(explained(error))
+        if not node.start():
+            return USAGE_ERROR if node.refused else FAILED
+        for remark in _unused_overrides(node):
+            node.get_logger().warning(remark)
         self.stop.raises = False
-        return self._spin(self._executor, self._node)
+        assert self._executor is not None
+        return self._spin(self._executor, node)
+
+    def _create(self, arguments: list[str]) -> ComponentNode:
+        others = parse_arguments(self._executable, arguments).others
+        if others:
+            raise ParameterError(f"{shown(others[0])}: unknown, expected --help, --summary FILE or --ros-args ...")
+        if self._summary is not None and not self._summary.parent.is_dir():
+            raise ParameterError(f"--summary {self._summary}: there is no such folder")
+        mission = mission_of_arguments(self._component_type, arguments)
+        # Signals are handled here: rclpy would shut its context down with messages still waiting to be answered,
+        # and an exception that a signal raises in a callback would pass through the executor's C++ frames.
+        with in_own_words():
+            rclpy.init(args=[sys.argv[0], *arguments], signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            self._executor = create_executor()
+        except ValueError as error:
+            raise ParameterError(str(error)) from error
+        node = create_node(self._component_type, self._executable, mission)
+        self._executor.add_node(node)
+        self._node = node  # from here on it is given up at the end, whatever comes
+        node.check()
+        for remark in mission.remarks:
+            node.get_logger().warning(remark)
+        return node
 
     def _refuse(self, reason: str) -> int:
         print(f"{self._executable}: {reason}", file=sys.stderr)
@@ -110,7 +130,7 @@ class _Process:
         if plant is not None:
             plant.halt()
             _spin_for(executor, _ANSWER_LIMIT, lambda: bool(plant.failed) or plant.answered)
-            return 1 if plant.failed else 0
+            return FAILED if plant.failed else 0
         _spin_for(executor, _DRAIN_LIMIT, _Quiet(node))
         return 0
 
@@ -128,6 +148,15 @@ class _Process:
             self._node.destroy_node()
         rclpy.try_shutdown()
         self.stop.ignore()
+
+
+def _unused_overrides(node: ComponentNode) -> Iterator[str]:
+    """Overrides of a quality of service that none of the node's topics has."""
+    known = [name for name in node.get_parameters_by_prefix("") if name.startswith("qos_overrides.")]
+    for name in node._parameter_overrides:
+        if name.startswith("qos_overrides.") and name not in known:
+            near = nearest(name, known)
+            yield f"{name}: no topic of this node has it" + (f"; did you mean {near}?" if near else "")
 
 
 class _Quiet:
@@ -148,66 +177,3 @@ class _Quiet:
 def _spin_for(executor: Executor, seconds: float, done: Callable[[], bool]) -> None:
     limit = time.monotonic() + seconds
     spin_until(executor, lambda: done() or time.monotonic() > limit, interval=0.01)
-
-
-def mission_of_arguments(component_type: type[Component], arguments: list[str]) -> Mission:
-    """The mission in the parameter files of a command line, later files over earlier ones; defaults without any.
-
-    Raises:
-        MissionError: a file is missing or wrong.
-    """
-    files = [b for a, b in pairwise(arguments) if a == "--params-file"]
-    parameters: dict[str, dict] = {}
-    for file in files:
-        try:
-            with open(file, encoding="utf-8") as stream:
-                text = stream.read()
-        except (OSError, UnicodeDecodeError) as error:
-            raise MissionError(f"{file}: cannot be read: {error}") from error
-        for section, nested in read_sections(text, file).items():
-            parameters.setdefault(section, {}).update(flattened(nested))
-    package, _, executable = component_type.__module__.partition(".nodes.")
-    name = executable
-    for argument in arguments:
-        name = argument.removeprefix("__node:=") if argument.startswith("__node:=") else name
-    _refuse_unknown_overrides(component_type, name, arguments)
-    shared = parameters.setdefault("/**", {})
-    if "graph.nodes" not in shared:
-        # A file for this node alone: the graph is the default one, with this node in it. A node of another package
-        # knows nothing of that graph and stands by itself.
-        nodes = default_values(GRAPH).graph.nodes
-        if not any(entry.startswith(f"{package}/") for entry in nodes):
-            nodes = []
-        if not any((entry.partition(":")[2] or entry.rpartition("/")[2]) == name for entry in nodes):
-            shared["graph.nodes"] = [*nodes, f"{package}/{executable}:{name}"]
-    given = {section: flat for section, flat in parameters.items() if flat}
-    return Mission(", ".join(files) or "defaults", given)
-
-
-def _refuse_unknown_overrides(component_type: type[Component], name: str, arguments: list[str]) -> None:
-    # ROS keeps an override that nobody declares without a word
-    known = [p.name for p in component_type.table()]
-    for option, assignment in pairwise(arguments):
-        node, _, key = assignment.partition(":=")[0].rpartition(":")
-        if option in ("-p", "--param") and node in ("", name) and key not in known and not belongs_to_ros(key):
-            raise ParameterError(unknown_name(key, known))
-
-
-def describe(component_type: type[Component]) -> str:
-    """Help text of a node: purpose, topics, parameters with unit, range and default."""
-    package, _, name = component_type.__module__.partition(".nodes.")
-    values = default_values(component_type.table())
-    lines = [f"ros2 run {package} {name} [--ros-args --params-file MISSION.yaml ...]", ""]
-    lines += [(component_type.__doc__ or "").strip(), "", "Subscribes:"]
-    lines += [
-        f"  {i.topic}  {type_name(i.message_type)}" + ("" if i.required else "  (optional)")
-        for i in component_type.inputs(name, values)
-    ] or ["  nothing"]
-    lines += ["", "Publishes:"]
-    lines += [f"  {o.topic}  {type_name(o.message_type)}" for o in component_type.outputs(name, values)]
-    lines += ["  /diagnostics  diagnostic_msgs/msg/DiagnosticArray", "", "Parameters (* may change in flight):"]
-    for p in component_type.table():
-        default = p.default if not (p.is_array and len(p.default) > 6) else f"{len(p.default)} values"
-        lines.append(f"  {'*' if p.tunable else ' '}{p.name} = {default}")
-        lines.append(f"      {p.description}; {p.expectation()}")
-    return "\n".join(lines)

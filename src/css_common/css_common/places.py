@@ -23,6 +23,12 @@ def results(kind: str) -> Path:
     return folder if may_write(folder) else Path(kind)
 
 
+def logs(environ: Mapping[str, str] = os.environ) -> Path:
+    """Folder of logs: in the project, or with what can be made again when the project is another user's."""
+    folder = Path(environ.get(HOME) or ".", "log")
+    return folder if may_write(folder) else scratch("log", environ)
+
+
 def scratch(name: str, environ: Mapping[str, str] = os.environ) -> Path:
     """Folder of what can be made again, e.g. compiled code: in the project, the user's cache, or a temporary folder.
 

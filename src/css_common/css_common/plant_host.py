@@ -21,6 +21,7 @@ from css_common.component import Outgoing, Plant
 from css_common.edge import HISTORY, Edge
 from css_common.host import ComponentNode
 from css_common.qos import PROGRESS_TOPIC
+from css_common.rcl_errors import endpoint
 from css_common.sole_subscription import writers_of
 from css_common.writers import Writer, local_processes, runs
 
@@ -84,7 +85,8 @@ class PlantNode(ComponentNode):
         self._divided = any(self.mission.outputs[topic].divider > 1 for topic in awaited)
         for topic in awaited:
             if topic not in consumed:
-                self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic))
+                with endpoint(topic):
+                    self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic, self.component))
         if lockstep.wait_for_recorder:
             self._recorded_ns = self.mission.epoch_ns - self.component.period_ns
             self._subscribe(Header, PROGRESS_TOPIC, self._note_recorded)
@@ -101,7 +103,7 @@ class PlantNode(ComponentNode):
 
     def _activate(self) -> None:
         # no fresh state here: a plant that was deactivated has paused, and time goes on where it stood
-        self._is_active = True
+        self.stepper.is_active = True
         self._waiting_since = time.monotonic()
         if self._begun:
             self._go_on_timer.reset()
@@ -211,8 +213,7 @@ class PlantNode(ComponentNode):
         self._waiting_since = time.monotonic()
         self.counters["cycles"] += 1
         try:
-            if self._events:
-                self._apply_events(stamp_ns)
+            self.stepper.apply_due(stamp_ns)
             if self._clock_publisher is not None:
                 seconds, nanoseconds = divmod(stamp_ns, 1_000_000_000)
                 self._clock_publisher.publish(Clock(clock=Time(sec=seconds, nanosec=nanoseconds)))
@@ -224,6 +225,8 @@ class PlantNode(ComponentNode):
             self._go_on_timer.reset()
 
     def _go_on(self) -> None:
+        if self._go_on_timer is None:  # a firing that was under way when the node was cleaned up
+            return
         self._go_on_timer.cancel()
         self._advance_if_answered()
 
@@ -233,6 +236,8 @@ class PlantNode(ComponentNode):
         self.done = True
 
     def _receive(self, key: str, edge: Edge, data: bytes) -> None:
+        if self.edges.get(key) is not edge:  # was under way when the node was cleaned up
+            return
         if edge.source.topic in self._lost:
             # it is back: whatever it says next counts, and the loop waits for it again
             edge.guard.last = None
@@ -249,7 +254,9 @@ class PlantNode(ComponentNode):
         recorded = self._recorded_ns
         return recorded is not None and self._stamp - recorded > _LEAD * self.component.period_ns
 
-    def _note(self, topic: str, data: bytes) -> None:
+    def _note(self, topic: str, component: Plant, data: bytes) -> None:
+        if component is not self.component:  # was under way when the node was cleaned up
+            return
         try:
             stamp_ns = stamp_of(data)
         except DecodeError:
@@ -331,11 +338,12 @@ class PlantNode(ComponentNode):
             missing = [PROGRESS_TOPIC]
         if silent_for < lockstep.warn_after or not missing:
             return
-        if silent_for >= lockstep.hold_limit and not_recorded:
+        # the recorder gives up a topic after the same limit, and must get to say so
+        if silent_for >= 2.0 * lockstep.hold_limit and not_recorded:
             self.failed = f"the recorder has said nothing for {silent_for:.1f} s"
             self.get_logger().error(self.failed)
             self.done = True
-        elif silent_for >= lockstep.hold_limit:
+        elif silent_for >= lockstep.hold_limit and not not_recorded:
             self.get_logger().error(
                 f"no {', '.join(missing)} for {silent_for:.1f} s: going on without, actuators at rest until it is back"
             )

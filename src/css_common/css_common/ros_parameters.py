@@ -3,6 +3,7 @@
 
 import sys
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
@@ -10,7 +11,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
-from css_common.schema import Parameter, ParameterError
+from css_common.schema import Parameter, ParameterError, integer
 
 _TYPES = {
     "real": RosParameter.Type.DOUBLE,
@@ -22,6 +23,8 @@ _TYPES = {
     "integers": RosParameter.Type.INTEGER_ARRAY,
     "texts": RosParameter.Type.STRING_ARRAY,
 }
+
+_DEPTH = integer("depth", 10, "-", "messages that are kept", low=1, high=1_000_000)  # what rcl makes of others is long
 
 
 def _descriptor(p: Parameter) -> ParameterDescriptor:
@@ -64,15 +67,36 @@ def declare(node: Node, table: Iterable[Parameter], canonical: Mapping[str, Any]
     for p in table:
         try:
             if not node.has_parameter(p.name):
-                value = canonical[p.name]
-                # an empty list says nothing about its type, so the type alone is declared for it
-                empty = p.is_array and len(value) == 0
-                node.declare_parameter(p.name, _TYPES[p.kind] if empty else value, _descriptor(p))
-            given = node.get_parameter_or(p.name, RosParameter(p.name, value=None)).value
+                _declare(node, p, canonical[p.name])
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            p.check(_plain(p, node._parameter_overrides[p.name].value))  # says it in the words of a mission
             raise ParameterError(f"{p.name}: expected {p.expectation()} ({error})") from error
-        result[p.name] = p.check([] if given is None and p.is_array else given)
+        result[p.name] = p.check(_plain(p, node.get_parameter(p.name).value))
+    for name, given in node._parameter_overrides.items():
+        if name.startswith("qos_overrides.") and name.endswith(".depth"):
+            replace(_DEPTH, name=name).check(given.value)
     return result
+
+
+def _declare(node: Node, p: Parameter, value: Any) -> None:
+    if not p.is_array:
+        node.declare_parameter(p.name, value, _descriptor(p))
+        return
+    # An empty list says nothing about its type to rclpy. Declared by type alone it has no value, and one parameter
+    # without a value makes every read of several, as of `ros2 param dump`, fail: so it is given the value after that.
+    open_to_change = _descriptor(p)
+    open_to_change.read_only = False
+    node.declare_parameter(p.name, _TYPES[p.kind], open_to_change)
+    if node.get_parameter_or(p.name).value is None:
+        overridden = p.name in node._parameter_overrides
+        node.set_parameters([RosParameter(p.name, _TYPES[p.kind], [] if overridden else list(value))])
+    descriptor = _descriptor(p)
+    descriptor.type = _TYPES[p.kind].value
+    node.set_descriptor(p.name, descriptor)
+
+
+def _plain(p: Parameter, value: Any) -> Any:
+    return list(value or ()) if p.is_array and not isinstance(value, str) else value
 
 
 def guard(

@@ -7,6 +7,7 @@ Arrays of rows are flat in a file (ROS parameters know no matrices) and come out
 """
 
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -14,6 +15,11 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+
+from css_common.parameter_words import word
+
+_LONGEST_NAME = 100  # [characters] of a name that is compared and shown whole
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
 class ParameterError(ValueError):
@@ -54,42 +60,48 @@ class Parameter:
             "integers": "a list of whole numbers",
             "texts": "a list of texts",
         }[self.kind]
+        unit = f" [{self.unit}]" if self.unit not in ("", "-") else ""
+        return ", ".join(filter(None, (f"{noun}{unit}", self._bounds(), self._size())))
+
+    def _bounds(self) -> str:
+        """Within what a number must lie, in words."""
         bounds = []
         if self.low is not None:
-            bounds.append(f"{'above' if self.open_low else 'at least'} {self.low:g}")
+            bounds.append(f"{'above' if self.open_low else 'at least'} {_number(self.low)}")
         if self.high is not None:
-            bounds.append(f"at most {self.high:g}")
+            bounds.append(f"at most {_number(self.high)}")
+        return " and ".join(bounds)
+
+    def _size(self) -> str:
+        """How many values a list must have, in words."""
         if self.length is not None:
-            bounds.append(f"{self.length} values")
-        if self.columns is not None:
-            bounds.append(f"rows of {self.columns} values")
-        unit = f" [{self.unit}]" if self.unit not in ("", "-") else ""
-        return f"{noun}{unit}" + (", " + " and ".join(bounds) if bounds else "")
+            return f"{self.length} values"
+        return f"rows of {self.columns} values" if self.columns is not None else ""
 
     def check(self, value: Any) -> Any:
         """The value in its canonical Python form (list elements included).
 
         Raises:
-            ParameterError: naming the parameter, the value and what was expected.
+            ParameterError: naming the parameter, the value and what was expected of it: its kind when that is wrong,
+                else what the value breaks.
         """
         try:
-            checked = self._converted(value)
-        except (TypeError, ValueError) as error:
-            raise ParameterError(f"{self.name}: {_shown(value)} given, expected {self.expectation()}") from error
-        return checked
+            return self._converted(value)
+        except TypeError as error:
+            raise ParameterError(f"{self.name}: {shown(value)} given, expected {self.expectation()}") from error
+        except ValueError as error:
+            raise ParameterError(f"{self.name}: {shown(value)} given, expected {error}") from error
 
     def _converted(self, value: Any) -> Any:
-        if self.is_array:
-            if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
-                raise TypeError
-            single = {"reals": "real", "integers": "integer", "texts": "text"}[self.kind]
-            values = [self._scalar(single, item) for item in value]
-            if self.length is not None and len(values) != self.length:
-                raise ValueError
-            if self.columns is not None and len(values) % self.columns:
-                raise ValueError
-            return values
-        return self._scalar(self.kind, value)
+        if not self.is_array:
+            return self._scalar(self.kind, value)
+        if isinstance(value, (str, bytes)) or not isinstance(value, Iterable):
+            raise TypeError
+        single = {"reals": "real", "integers": "integer", "texts": "text"}[self.kind]
+        values = [self._scalar(single, item) for item in value]
+        if (self.length is not None and len(values) != self.length) or (self.columns and len(values) % self.columns):
+            raise ValueError(f"{self._size()}, not {len(values)}")
+        return values
 
     def _scalar(self, kind: str, value: Any) -> Any:
         if kind == "flag":
@@ -99,30 +111,22 @@ class Parameter:
         if kind in ("text", "choice"):
             if not isinstance(value, str) or (kind == "choice" and value not in self.choices):
                 raise TypeError
+            if _CONTROL.search(value):
+                raise ValueError("one line without control characters")
             return value
         if isinstance(value, bool):
             raise TypeError
-        if kind == "integer":
-            if not isinstance(value, (int, np.integer)):
-                raise TypeError
-            number: Any = int(value)
-            if not -(2**63) <= number < 2**63:  # what a ROS parameter holds
-                raise ValueError
-        else:
-            # ROS refuses `1` where a double is declared; so do we, so that a file means the same to every reader
-            if not isinstance(value, (float, np.floating)):
-                raise TypeError
-            number = float(value)
-        if not math.isfinite(number):
-            raise ValueError
-        if self.low is not None and (number < self.low or (self.open_low and number == self.low)):
-            raise ValueError
-        if self.high is not None and number > self.high:
-            raise ValueError
+        return self._in_bounds(_whole(value) if kind == "integer" else _real(value))
+
+    def _in_bounds(self, number: Any) -> Any:
+        below = self.low is not None and (number < self.low or (self.open_low and number == self.low))
+        if below or (self.high is not None and number > self.high):
+            unit = f" [{self.unit}]" if self.unit not in ("", "-") else ""
+            raise ValueError(f"{'each ' if self.is_array else ''}{self._bounds()}{unit}")
         return number
 
     def parse(self, text: str) -> Any:
-        """The checked value of a command-line text; numbers may be written without a point.
+        """The checked value of a command-line text, in the words of a file; numbers may be written without a point.
 
         Raises:
             ParameterError: the text is no such value.
@@ -135,19 +139,9 @@ class Parameter:
         if self.kind == "texts":
             items = [item.strip("'\"") for item in items]  # as in a file
         base = {"reals": "real", "integers": "integer", "texts": "text"}.get(self.kind, self.kind)
-        values: list[Any] = []
-        for item in items:
-            try:
-                if base == "flag":
-                    values.append({"true": True, "false": False, "on": True, "off": False}[item.lower()])
-                elif base == "real":
-                    values.append(float(item))
-                elif base == "integer":
-                    values.append(int(item))
-                else:
-                    values.append(item)
-            except (KeyError, ValueError) as error:
-                raise ParameterError(f"{self.name}: {text!r} given, expected {self.expectation()}") from error
+        values = items if base in ("text", "choice") else [word(item) if item else item for item in items]
+        if base == "real":
+            values = [float(value) if type(value) is int else value for value in values]
         return self.check(values if self.is_array else values[0])
 
     def shaped(self, value: Any) -> Any:
@@ -160,9 +154,31 @@ class Parameter:
         return value
 
 
-def _shown(value: Any) -> str:
-    text = repr(value)
+def shown(value: Any) -> str:
+    """A value as messages show it: on one line, its end cut off when it is long."""
+    text = repr(value[:100] if isinstance(value, (str, list)) else value)
     return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _number(limit: float) -> str:
+    return str(limit) if isinstance(limit, int) else f"{limit:g}"
+
+
+def _whole(value: Any) -> int:
+    if not isinstance(value, (int, np.integer)):
+        raise TypeError
+    if not -(2**63) <= value < 2**63:
+        raise ValueError("a whole number of 64 bits, as a ROS parameter holds it")
+    return int(value)
+
+
+def _real(value: Any) -> float:
+    # ROS refuses `1` where a double is declared; so do we, so that a file means the same to every reader
+    if not isinstance(value, (float, np.floating)):
+        raise TypeError
+    if not math.isfinite(value):
+        raise ValueError("a finite number")
+    return float(value)
 
 
 def real(
@@ -308,6 +324,13 @@ def default_values(table: Iterable[Parameter], **changes: Any) -> Values:
 
 def unknown_name(name: str, known: Iterable[str]) -> str:
     """Message for an unknown name, with the nearest known one."""
-    near = get_close_matches(name, list(known), n=1)
-    shown = name if name and name.isprintable() else repr(name)
-    return f"{shown}: unknown" + (f"; did you mean {near[0]}?" if near else "")
+    near = nearest(name, known)
+    plain = name and name.isprintable() and len(name) <= _LONGEST_NAME
+    return f"{name if plain else shown(name)}: unknown" + (f"; did you mean {near}?" if near else "")
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name that a wrong one was probably meant to be; None when none is like it."""
+    # the comparison takes a time that grows with the square of the length
+    near = get_close_matches(name, list(known), n=1) if len(name) <= _LONGEST_NAME else []
+    return near[0] if near else None

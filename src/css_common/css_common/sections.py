@@ -5,6 +5,7 @@ They stand under `/**` in a mission file. Defaults are the spacecraft and orbit 
 """
 
 import math
+import re
 from collections.abc import Iterator
 
 import numpy as np
@@ -12,10 +13,13 @@ import numpy as np
 from css_common.codec import MAX_FRAME
 from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
-from css_common.schema import Table, Values, choice, flag, integer, real, reals, text, texts
+from css_common.schema import Table, Values, choice, flag, integer, real, reals, shown, text, texts
 
 _R = 0.7071067811865476
 _LAST_STAMP_NS = 2**31 * 1_000_000_000
+_NAME = re.compile(r"\w[\w !#$%&'()+,\-.;=@\[\]^`{}~]*")  # nothing that a file system takes for its own
+_LONGEST_NAME = 100  # [bytes] with what is added to it a file name of 255 bytes
+_MOST_STEPS = 10**9
 _LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
 MISSION: Table = (
@@ -89,6 +93,8 @@ CELLS: Table = (
         "normal of the body plane that hides the other half space from each cell; zeros: no such plane",
         length=3,
     ),
+    real("cells.smallest_reading", -10.0, "-", "an output below it is no reading: the cell is missing", high=0.0),
+    real("cells.largest_reading", 10.0, "-", "an output above it is no reading: the cell is missing", low=0.0),
 )
 
 WHEELS: Table = (
@@ -254,6 +260,14 @@ SECTIONS: dict[str, Table] = {
 }
 
 
+def name_for_files(text: str) -> str:
+    """A text made a `mission.name`: what no name may hold becomes `_`, and what is too long is cut off."""
+    kept = "".join(letter if letter == "_" or _NAME.fullmatch(f"_{letter}") else "_" for letter in text)
+    if not _NAME.match(kept):
+        kept = f"_{kept}"
+    return kept.encode()[:_LONGEST_NAME].decode(errors="ignore")
+
+
 def wheel_axes(values: Values) -> np.ndarray:
     """Spin axes (N, 3) of the reaction wheels that the spacecraft carries, in b; none without wheels."""
     return values.wheels.axes if values.wheels.fitted else np.zeros((0, 3))
@@ -290,6 +304,17 @@ def conflicts(values: Values) -> Iterator[str]:
 
 
 def _mission_conflicts(mission: Values) -> Iterator[str]:
+    if not _NAME.fullmatch(mission.name) or len(mission.name.encode()) > _LONGEST_NAME:
+        yield (
+            f"mission.name: {shown(mission.name)} given, expected a name for files of at most {_LONGEST_NAME} bytes: "
+            "letters, digits, spaces and _-+.,=() and the like, the first a letter or digit"
+        )
+    steps = mission.duration / mission.period
+    if not 1.0 - 1e-6 <= steps <= _MOST_STEPS:
+        yield (
+            f"mission.duration: {mission.duration:g} s given, {steps:.3g} steps of mission.period {mission.period:g} s,"
+            f" expected 1 to {_MOST_STEPS}"
+        )
     try:
         begin = parse_utc(mission.epoch)
     except ValueError as error:

@@ -69,9 +69,17 @@ def test_declared_values_are_those_of_the_mission(bench, node):
     assert values[6].double_value == 0.5
 
 
-def test_empty_lists_have_a_type_too(node):
-    assert node.get_parameter_or("io.accepted_frames").type_ in (Parameter.Type.NOT_SET, Parameter.Type.STRING_ARRAY)
-    assert node.component.values.io.accepted_frames == []
+def test_empty_lists_have_a_type_and_a_value(bench, mission):
+    node = bench.host(find_component("testbed", "estimator"), mission(text=TEXT.replace("[a, b]", "[]")), "estimator")
+    names = ["io.accepted_frames", "labels", "gain"]
+    frames, labels, gain = bench.request(
+        GetParameters, "estimator/get_parameters", GetParameters.Request(names=names)
+    ).values
+    assert frames.type == labels.type == ParameterType.PARAMETER_STRING_ARRAY
+    assert list(frames.string_array_value) == list(labels.string_array_value) == []
+    assert gain.double_value == 2.0
+    assert node.component.values.io.accepted_frames == node.component.values.labels == []
+    assert not set_parameters(bench, labels=["c"])[0].successful, "fixed at start, empty or not"
 
 
 def test_tunable_parameters_change_in_flight(bench, node):
@@ -96,14 +104,14 @@ REFUSED = {
         ("3.0", "expected 'Type.DOUBLE'"), ([3.0], "expected 'Type.DOUBLE'"),
     ],
     "weights": [
-        ([1.0], "weights: [1.0] given, expected a list of numbers written with points, at least 0 and 2 values"),
+        ([1.0], "weights: [1.0] given, expected 2 values, not 1"),
         ([1.0, -1.0], "weights: [1.0, -1.0] given"), ([1.0, float("nan")], "weights: [1.0, nan] given"),
         ([1, 2], "expected 'Type.DOUBLE_ARRAY'"),
     ],
     "fault": [("everything", "fault: 'everything' given, expected one of none, raise, nan")],
     "floor": [
         (5.0, "floor: 5.0 given, expected at most the gain of 2.0"),
-        (float("nan"), "floor: nan given, expected a number"),
+        (float("nan"), "floor: nan given, expected a finite number"),
     ],
     "window": [(5, "read-only")],
     "use_gyro": [(True, "read-only")],
@@ -195,22 +203,27 @@ def test_overrides_of_the_command_line_win():
     assert values["floor"] == 0.0
 
 
+def test_list_may_be_emptied_on_the_command_line():
+    assert overridden("-p", "labels:=[]")["labels"] == []
+
+
 @pytest.mark.parametrize(
     ("override", "reason"),
     [
-        ("gain:=3", "gain: expected a number written with a point, at least 0 and at most 10"),
-        ("gain:=11.0", "gain: expected a number written with a point, at least 0 and at most 10"),
-        ("gain:=much", "gain: expected a number written with a point"),
-        ("gain:=.nan", "gain: "),
-        ("window:=0", "window: expected a whole number, at least 1 and at most 100"),
-        ("window:=1.0", "window: expected a whole number"),
-        ("width_deg:=0.0", "width_deg: 0.0 given, expected a number written with a point [deg], above 0"),
-        ("weights:=[1.0]", "weights: [1.0] given, expected a list of numbers written with points, "),
-        ("weights:=[1, 2]", "weights: expected a list of numbers written with points"),
+        ("gain:=3", "gain: 3 given, expected a number written with a point, at least 0 and at most 10"),
+        ("gain:=11.0", "gain: 11.0 given, expected at least 0 and at most 10"),
+        ("gain:=much", "gain: 'much' given, expected a number written with a point"),
+        ("gain:=.nan", "gain: nan given, expected a finite number"),
+        ("window:=0", "window: 0 given, expected at least 1 and at most 100"),
+        ("window:=1.0", "window: 1.0 given, expected a whole number"),
+        ("width_deg:=0.0", "width_deg: 0.0 given, expected above 0 and at most 90 [deg]"),
+        ("weights:=[1.0]", "weights: [1.0] given, expected 2 values, not 1"),
+        ("weights:=[]", "weights: [] given, expected 2 values, not 0"),
+        ("weights:=[1, 2]", "weights: [1, 2] given, expected a list of numbers written with points"),
         ("rows:=[1.0, 2.0]", "rows: [1.0, 2.0] given"),
         ("fault:=all", "fault: 'all' given, expected one of none"),
-        ("note:=1.0", "note: expected a text"),
-        ("use_gyro:=1", "use_gyro: expected true or false"),
+        ("note:=1.0", "note: 1.0 given, expected a text"),
+        ("use_gyro:=1", "use_gyro: 1 given, expected true or false"),
     ],
 )
 def test_bad_overrides_are_refused_at_the_start(override, reason):

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from css_common.codec import Sample
 from css_common.component import Component, Input
-from css_common.edge import HISTORY, Matcher, StampGuard
+from css_common.edge import HISTORY, StampGuard
+from css_common.matching import Matcher
 from css_common.schema import default_values
 from css_common.sections import IO, MISSION
 from css_msgs.msg import CssVoltages

@@ -76,7 +76,7 @@ def test_keys_are_words_as_in_ros():
 def test_overrides_reach_shared_sections_and_nodes():
     mission = mission_of(
         "", "mission.duration=20", "cells.normals=[1,0,0, 0,1,0]", "estimator.gain=3", "estimator.weights=0.5, 0.25",
-        "estimator.use_gyro=false", "estimator.io.deadline=0.125", "estimator.labels=a,b", "mission.name=a=b",
+        "estimator.use_gyro=false", "estimator.io.deadline=0.125", "estimator.labels=a,b", "mission.description=a=b",
         "lockstep.wait_for=[]", "estimator.offset=-3",
     )  # fmt: skip
     estimator = mission.node("estimator").values
@@ -87,7 +87,7 @@ def test_overrides_reach_shared_sections_and_nodes():
     assert estimator.weights.tolist() == [0.5, 0.25]
     assert (estimator.io.deadline, mission.values.io.deadline) == (0.125, 0.5)
     assert estimator.labels == ["a", "b"]
-    assert mission.name == "a=b"
+    assert mission.values.mission.description == "a=b"
     assert mission.values.lockstep.wait_for == []
 
 
@@ -214,10 +214,10 @@ names = st.text("abcdefghij_0123456789", min_size=1, max_size=6)
 values = st.one_of(
     st.booleans(),
     st.integers(-(2**63), 2**63 - 1),
-    st.floats(allow_nan=False, allow_infinity=False),
+    st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=False),
     st.text(max_size=12),
     st.sampled_from(["1e4", "1e-4", ".5e3", "on", "y", "~", "", "null", "0x10", "010", "1_0", "1:30", "2013-06-01"]),
-    st.lists(st.floats(allow_nan=False, allow_infinity=False), max_size=20),
+    st.lists(st.floats(allow_nan=False, allow_infinity=False, allow_subnormal=False), max_size=20),
     st.lists(st.text(max_size=4), max_size=4),
 )
 

@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every way in which a mission file can be wrong gives one line that names file, key, value and what was expected."""
 
+import os
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from css_common.mission import Mission, find_mission, load_mission, mission_from_text
-from css_common.mission_file import MissionError
+from css_common.mission_file import MissionError, read_text
+from css_common.sections import name_for_files
 
 HEAD = """\
 /**:
@@ -41,18 +44,38 @@ NOT_A_PARAMETER_FILE = {
     "just words": "expected node names at the top, found str",
     "/**: {mission: {name: x}}": "/**: expected the one key ros__parameters below it",
     "/**:": "/**: expected the one key ros__parameters below it",
-    "/**: {ros__parameters: 3}": "/**: ros__parameters must hold keys and values",
     "/**: {ros__parameters: }": "/**: ros__parameters must hold keys and values",
+    "/**: 3": "/**: expected the one key ros__parameters below it",
+    "/**/mission:\n  name: x": "/**/mission: expected the one key ros__parameters below it",
+    "a: {b-c: {ros__parameters: {}}}": "a: expected the name of a node, 'a/b-c' is none",
+    "a//b: {ros__parameters: {}}": "a//b: expected the name of a node",
+    "'**': {ros__parameters: {}, b: 1}": "**: expected the one key ros__parameters below it",
+    "/**: {ros__parameters: 3}": "/**: ros__parameters must hold keys and values",
+    "/**: {ros__parameters: [a]}": "/**: ros__parameters must hold keys and values",
     "/**: {ros__parameters: {}, also: 1}": "expected the one key ros__parameters",
     "a: [1, 2": "not valid YAML",
     "a: 1\n b: 2": "not valid YAML",
-    "a: !!python/object:os.system x": "not valid YAML",
+    "a: !!python/object:os.system x": "line 1: a: the tag !!python/object:os.system is not read by ROS",
+    "/**:\n  ros__parameters:\n    mission: {name: !!bool foo}": "line 3: /**.mission.name: the tag !!bool is not read",
+    "/**: {ros__parameters: {mission: {epoch: !!timestamp foo}}}": "/**.mission.epoch: the tag !!timestamp is not read",
+    "/**: {ros__parameters: {mission: {name: !!binary Zm9v}}}": "/**.mission.name: the tag !!binary is not read by ROS",
+    "/**: {ros__parameters: {mission: !!set {a, b}}}": "/**.mission: the tag !!set is not read by ROS",
+    "/**: {ros__parameters: {mission: !!omap [a: b]}}": "/**.mission: the tag !!omap is not read by ROS",
+    "/**: {ros__parameters: {!!binary mission: {}}}": "the tag !!binary is not read by ROS",
+    "/**: {ros__parameters: {mission: {case: !mine 3}}}": "/**.mission.case: the tag !mine is not read by ROS",
+    "? ''\n: 1": "line 1: expected a word as key",
+    "a: \ud800": "not valid YAML: line 1: '\\ud800' is half a character",
+    'a: "\\ud800"': "not valid YAML: line 1: ",
+    "a: \x00": "not valid YAML",
+    "a:\n\tb: 1": "not valid YAML: line 2: ",
+    "a: &x [b]\nc: &y [*x, *x]": "line 2: aliases are not read by ROS",
+    "a:\n  <<: {b: 1}": "a: expected the one key ros__parameters below it",
+    "{a: " * 10_000: "nested more than 32 deep",
     "a: \x07": "not valid YAML",
     "a: 1\n---\nb: 2": "not valid YAML",
     "? [a, b]\n: 1": "line 1: expected a word as key",
     "? {a: b}\n: 1": "line 1: expected a word as key",
     "[" * 3000: "not valid YAML",
-    "/**: {ros__parameters: {mission: {seed: " + "9" * 5000 + "}}}": "not valid YAML",
 }
 
 
@@ -86,21 +109,23 @@ SHARED_ERRORS = {
     "io: {deadlin: 0.5}": "bench.yaml: /**: io.deadlin: unknown; did you mean io.deadline?",
     "ios: {deadline: 0.5}": "bench.yaml: /**: ios.deadline: unknown; did you mean io.deadline?",
     "io: {deadline: 1}": "bench.yaml: /**: io.deadline: 1 given, expected a number written with a point [s]",
-    "io: {deadline: -0.5}": "bench.yaml: /**: io.deadline: -0.5 given, expected a number written with a point [s], "
-    "at least 0.001",
+    "io: {deadline: -0.5}": "bench.yaml: /**: io.deadline: -0.5 given, expected at least 0.001 [s]",
     "io: {deadline: }": "bench.yaml: /**: io.deadline: None given",
-    "io: {deadline: .nan}": "bench.yaml: /**: io.deadline: nan given",
+    "io: {deadline: .nan}": "bench.yaml: /**: io.deadline: nan given, expected a finite number",
+    "use_sim_time: 3": "bench.yaml: /**: use_sim_time: 3 given, expected true or false",
+    "mission.seed: " + "9" * 5000: "/**: mission.seed: '99999999",
+    "mission.seed: " + "9" * 19: "/**: mission.seed: 1e+19 given, expected a whole number",
+    "mission.description: \"a\\eb\"": "description: 'a\\x1bb' given, expected one line without control characters",
     "io: {deadline: [0.5]}": "bench.yaml: /**: io.deadline: [0.5] given",
     "io: {deadline: {x: 0.5}}": "bench.yaml: /**: io.deadline.x: unknown; did you mean io.deadline?",
     "io: {body_frame: off}": "bench.yaml: /**: io.body_frame: False given, expected a text",
     "io: {input_matching: newest}": "'newest' given, expected one of exact, latest",
     "autostart: 1": "bench.yaml: /**: autostart: 1 given, expected true or false",
-    "cells: {normals: [0.0, 0.0]}": "bench.yaml: /**: cells.normals: [0.0, 0.0] given, expected a list of numbers "
-    "written with points, rows of 3 values",
+    "cells: {normals: [0.0, 0.0]}": "/**: cells.normals: [0.0, 0.0] given, expected rows of 3 values, not 2",
     "cells: {normals: [0.0, 0, 1.0]}": "cells.normals: [0.0, 0, 1.0] given, expected a list of numbers written with",
     "cells: {normals: [[0.0, 0.0, 1.0]]}": "cells.normals: [[0.0, 0.0, 1.0]] given, expected a list of numbers",
     "cells: {normals: [0.0, 0.0, 2.0]}": "bench.yaml: /**: cells.normals: row 0 has length 2, expected unit vectors",
-    "cells: {field_of_view_deg: 200.0}": "bench.yaml: /**: cells.field_of_view_deg: 200.0 given, expected a number",
+    "cells: {field_of_view_deg: 200.0}": "/**: cells.field_of_view_deg: 200.0 given, expected at least 1 and at",
     "orbit: {source: tle}": "bench.yaml: /**: orbit.tle_line1: expected the 69 characters",
     "spacecraft: {inertia: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0]}": "spacecraft.inertia: eigenvalue -1",
     "wheels: {axes: [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0]}": "wheels.axes: they span 1 of 3 directions",
@@ -122,18 +147,21 @@ def test_epoch_that_is_no_instant():
 
 NODE_ERRORS = {
     ("estimator", "{gian: 2.0}"): "bench.yaml: estimator: gian: unknown; did you mean gain?",
-    ("estimator", "{gain: 20.0}"): "bench.yaml: estimator: gain: 20.0 given, expected a number written with a point, "
-    "at least 0 and at most 10",
+    ("estimator", "{gain: 20.0}"): "bench.yaml: estimator: gain: 20.0 given, expected at least 0 and at most 10",
     ("estimator", "{gain: 2}"): "bench.yaml: estimator: gain: 2 given, expected a number written with a point",
     ("estimator", "{floor: 3.0}"): "bench.yaml: estimator: floor: 3.0 given, expected at most the gain of 1.0",
-    ("estimator", "{width_deg: 0.0}"): "expected a number written with a point [deg], above 0 and at most 90",
+    ("estimator", "{width_deg: 0.0}"): "0.0 given, expected above 0 and at most 90 [deg]",
     ("estimator", "{fault: all}"): "bench.yaml: estimator: fault: 'all' given, expected one of none, raise, nan",
     ("estimator", "{weights: [1.0]}"): "bench.yaml: estimator: weights: [1.0] given",
     ("estimator", "{orbit: {altitude: 5.0e+5}}"): "bench.yaml: estimator: orbit.altitude: unknown",
     ("estimatr", "{gain: 2.0}"): "bench.yaml: section estimatr: unknown; did you mean estimator? (sections are /** "
     "and the nodes of graph.nodes: source, gyro, estimator, controller)",
-    ("/ns/estimator", "{gain: 2.0}"): "bench.yaml: section ns/estimator: unknown",
-    ("/*", "{gain: 2.0}"): "bench.yaml: section *: unknown",
+    ("/ns/estimator", "{gain: 2.0}"): "bench.yaml: section /ns/estimator: unknown",
+    ("/ns/*", "{gain: 2.0}"): "bench.yaml: section /ns/*: unknown",
+    ("/*", "{gian: 2.0}"): "bench.yaml: /*: gian: unknown; did you mean gain?",
+    ("/**/estimator", "{gian: 2.0}"): "bench.yaml: /**/estimator: gian: unknown; did you mean gain?",
+    ("/**/estimator", "{gain: 20.0}"): "bench.yaml: estimator: gain: 20.0 given, expected at least 0 and at most 10",
+    ("/**/estimatr", "{gain: 2.0}"): "bench.yaml: section /**/estimatr: unknown; did you mean estimator?",
 }
 
 
@@ -152,6 +180,10 @@ GRAPH_ERRORS = {
     "testbed/estimatr": "there is no testbed/nodes/estimatr.py in this workspace",
     "testbod/estimator": "there is no testbod/nodes/estimator.py in this workspace",
     "testbed/nothing": "graph.nodes: testbed.nodes.nothing defines no component",
+    "os/path": "there is no os/nodes/path.py in this workspace",
+    "__main__/x": "expected PACKAGE/EXECUTABLE[:NAME]",
+    "this/that": "there is no this/nodes/that.py in this workspace",
+    "testbed/estimator:" + "n" * 101: "expected at most 100 letters",
     "testbed/gyro": "graph.nodes: two nodes are called gyro",
     "testbed/rival": "rival and source both publish voltages",
 }
@@ -231,8 +263,10 @@ def test_events(event):
 CRITERIA_ERRORS = {
     "{pointing: {most: 1.0}}": "criteria.pointing.most: unknown, expected min or max",
     "{pointing: {max: 1}}": "criteria.pointing.max: 1 given, expected a number written with a point",
-    "{pointing: {max: .nan}}": "criteria.pointing.max: nan given, expected a number",
-    "{pointing: 5.0}": "criteria.pointing",
+    "{pointing: {max: .nan}}": "criteria.pointing.max: nan given, expected a finite number",
+    "{pointing: {max: many}}": "criteria.pointing.max: 'many' given, expected a number written with a point",
+    "{pointing: {min: 2.0, max: 1.0}}": "criteria.pointing.min: 2.0 given, expected at most the max of 1.0",
+    "{pointing: 5.0}": "criteria.pointing: unknown, expected min or max",
 }
 
 
@@ -253,7 +287,8 @@ OVERRIDE_ERRORS = {
     "estimator.gain=20": "override estimator.gain: 20.0 given",
     "estimator.floor=5": "bench.yaml: estimator: floor: 5.0 given, expected at most the gain of 1.0",
     "cells.normals=1,2": "override cells.normals: [1.0, 2.0] given",
-    "cells.normals=1,2,x": "override cells.normals: '1,2,x' given",
+    "cells.normals=1,2,x": "override cells.normals: [1.0, 2.0, 'x'] given, expected a list of numbers",
+    "estimator.gain=": "override estimator.gain: '' given, expected a number",
     "graph.nodes=testbed/source": "controller needs",
     "=1": "override '': unknown",
 }
@@ -279,7 +314,7 @@ def test_files_that_are_not_there(tmp_path, monkeypatch):
     with pytest.raises(MissionError, match=r"^mission bnech: unknown; did you mean bench\? \(missions: bench\)$"):
         load_mission("bnech")
     (tmp_path / "config" / "folder.yaml").mkdir()
-    with pytest.raises(MissionError, match=r"folder\.yaml: no such mission file$"):
+    with pytest.raises(MissionError, match=r"folder\.yaml: a mission is a regular file$"):
         load_mission("config/folder.yaml")
     (tmp_path / "latin.yaml").write_bytes("/**: ä".encode("latin-1"))
     with pytest.raises(MissionError, match=r"^latin\.yaml: cannot be read: "):
@@ -306,3 +341,126 @@ def test_any_text_is_a_mission_or_refused_in_one_line(text):
         assert len(str(error).splitlines()) == 1
     else:
         assert isinstance(mission, Mission)
+
+
+MISSION_ERRORS = {
+    "name: ../elsewhere/precious": "mission.name: '../elsewhere/precious' given, expected a name for files",
+    "name: /tmp/x": "mission.name: '/tmp/x' given",
+    "name: ..": "mission.name: '..' given",
+    "name: .hidden": "mission.name: '.hidden' given",
+    "name: -rf": "mission.name: '-rf' given",
+    "name: ''": "mission.name: '' given",
+    'name: "\U0001f680"': "mission.name: '\U0001f680' given",
+    'name: "a\\0b"': r"mission.name: 'a\x00b' given, expected one line without control characters",
+    'name: "a\\nb"': r"mission.name: 'a\nb' given, expected one line without control characters",
+    "name: " + "n" * 5000: "expected a name for files of at most 100 bytes",
+    "name: " + "ü" * 51: "expected a name for files of at most 100 bytes",
+    "duration: 0.05": "mission.duration: 0.05 s given, 0.5 steps of mission.period 0.1 s, expected 1 to",
+    "duration: 3.2e+7\n      period: 0.001": "mission.duration: 3.2e+07 s given, 3.2e+10 steps",
+    "duration: 1e+300": "mission.duration: 1e+300 given, expected above 0 and at most 3.2e+07 [s]",
+    "epoch: 9999-12-31": "9999-12-31 given, expected a flight of 5550 s between 1970-01-01 and 2038-01-19: ",
+    "epoch: 9999-12-31T23:59:59-23:59": "between 1970-01-01 and 2038-01-19",
+    "epoch: 0001-01-01T00:00:00+23:59": "between 1970-01-01 and 2038-01-19",
+    "epoch: 2038-01-19T03:14:08Z": "between 1970-01-01 and 2038-01-19",
+    "epoch: 1969-12-31T23:59:59Z": "between 1970-01-01 and 2038-01-19",
+    "epoch: 2016-12-31T23:59:60Z": "2013-06-01T00:00:00Z; ROS stamps know no leap second",
+    "epoch: 1:30": "mission.epoch: '1:30' is not a UTC instant",
+    "period: 1:30": "mission.period: '1:30' given, expected a number written with a point [s]",
+    "case: 010.0": "mission.case: 10.0 given, expected a whole number",
+    "seed: -1": "mission.seed: -1 given, expected at least 0 and at most 9223372036854775807",
+}
+
+
+@pytest.mark.parametrize("line", MISSION_ERRORS)
+def test_name_time_and_numbers_of_a_mission(line):
+    message = refusal(f"/**:\n  ros__parameters:\n    mission:\n      {line}\n")
+    assert message.startswith("bench.yaml: /**: ")
+    assert MISSION_ERRORS[line] in message
+
+
+@pytest.mark.parametrize("name", ["okeefe_2013", "x", "Flug 7 (2)", "v1.2-rc+3", "été", "ü" * 50])
+def test_names_that_are_names_for_files(name):
+    assert mission_from_text(HEAD.replace("bench", f'"{name}"'), "bench.yaml").name == name
+    assert name_for_files(name) == name
+
+
+@pytest.mark.parametrize(
+    ("text", "name"),
+    [("a/b", "a_b"), ("../x", "_.._x"), ("", "_"), ("(1)", "_(1)"), ("\U0001f680", "_"), ("ü" * 60, "ü" * 50)],
+)
+def test_what_is_no_name_is_made_one(text, name):
+    assert name_for_files(text) == name
+    assert mission_from_text(HEAD.replace("bench", f'"{name_for_files(text)}"'), "bench.yaml").name == name
+
+
+def test_flight_that_ends_within_a_step_says_so():
+    assert mission_from_text(HEAD, "bench.yaml").remarks == ()
+    (remark,) = mission_from_text(HEAD, "bench.yaml", ["mission.duration=1.26"]).remarks
+    assert remark == (
+        "mission.duration: 1.26 s is no multiple of mission.period 0.1 s: 13 steps are flown, 1.3 s"
+    )
+
+
+def shared_lines(form: str, count: int) -> str:
+    """A shared section of many lines."""
+    return HEAD + "".join("    " + form.format(i) + "\n" for i in range(count))
+
+
+LARGE = {
+    "keys": (shared_lines("k{}: 1", 20_000), "k0: unknown"),
+    "keys like known ones": (shared_lines("mission.duratio{}: 1.0", 20_000), "did you mean mission.duration?"),
+    "a long key": (shared_lines("? " + "k" * 100_000 + "\n    : 1", 1), "...: unknown"),
+    "sections": ("".join(f"s{i}: {{ros__parameters: {{a: 1}}}}\n" for i in range(20_000)), "section s0: unknown"),
+    "nodes": (HEAD.replace("[", "[" + "testbed/gyro, " * 20_000), "graph.nodes: 20004 given, expected at most 64"),
+    "events": (shared_lines("events.e{}: {{time: 1.0, node: gyro, action: stop}}", 20_000), "'stop' given"),
+    "a list": (shared_lines("cells: {{normals: [" + "0.0, " * 300_000 + "0.0]}}", 1), "expected rows of 3 values"),
+    "nesting": (HEAD + "".join(" " * i + "a:\n" for i in range(2_000)), "nested more than 32 deep"),
+}
+
+
+@pytest.mark.timeout(60)  # what grows with the square of the size takes longer, the others take a second
+@pytest.mark.parametrize("kind", LARGE)
+def test_large_files_are_refused_in_a_moment(kind):
+    text, reason = LARGE[kind]
+    assert reason in refusal(text)
+
+
+FILES = {
+    "mark of UTF-8": (HEAD.encode("utf-8-sig"), None),
+    "UTF-16 with its mark": (HEAD.encode("utf-16"), None),
+    "other ends of lines": (HEAD.replace("\n", "\r\n").encode(), None),
+    "UTF-16 without a mark": (HEAD.encode("utf-16-be"), "x.yaml: not valid YAML"),
+    "NUL": (HEAD.encode() + b"\0", "x.yaml: not valid YAML"),
+    "half a pair of surrogates": (HEAD.encode() + b"\xed\xa0\x80", "x.yaml: cannot be read: "),
+    "tabs": (HEAD.replace("  ", "\t").encode(), "x.yaml: not valid YAML: line 2: "),
+    "nothing": (b"", "x.yaml: holds no parameters"),
+    "a comment": (b"# none\n", "x.yaml: holds no parameters"),
+    "too much": (b"#" * 4_000_001, "x.yaml: cannot be read: 4000001 bytes, expected at most 4000000"),
+}
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_bytes_of_a_file(kind, tmp_path):
+    data, reason = FILES[kind]
+    (tmp_path / "x.yaml").write_bytes(data)
+    if reason is None:
+        assert load_mission(tmp_path / "x.yaml").name == "bench"
+    else:
+        with pytest.raises(MissionError) as caught:
+            load_mission(tmp_path / "x.yaml")
+        assert reason in str(caught.value)
+
+
+def test_what_is_no_file(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    for path in (tmp_path, tmp_path / "pipe.yaml", "/dev/zero", "/dev/null"):
+        with pytest.raises(MissionError, match=r": a mission is a regular file$"):
+            load_mission(path)
+    for path in (tmp_path / "pipe.yaml", "/dev/zero", tmp_path):
+        with pytest.raises(MissionError, match=r": cannot be read: expected a regular file$"):
+            read_text(path)
+    for path in ("a\0b.yaml", "a\udcff.yaml", f"{'n' * 300}.yaml", f"{'n' * 5000}.yaml"):
+        with pytest.raises(MissionError, match=r": no such mission file$"):
+            load_mission(path)
+        with pytest.raises(MissionError, match=r": cannot be read: "):
+            read_text(path)

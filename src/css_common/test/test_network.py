@@ -9,6 +9,7 @@ import pytest
 from ament_index_python.packages import get_package_prefix
 
 from css_common.network import NetworkError, stay_on_this_machine
+from css_common.testing import Bench
 
 RANGE, PEERS = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS"
 
@@ -63,3 +64,13 @@ def test_executables_refuse_a_domain_that_is_none_in_one_line(tmp_path):
     code, err = run(["-o", str(tmp_path / "bag")], ROS_DOMAIN_ID="abc")
     assert (code, err) == (2, "recorder: ROS_DOMAIN_ID: 'abc' given, expected a whole number from 0 to 232\n")
     assert not (tmp_path / "bag").exists()
+
+
+def test_discovery_opens_no_multicast_port():
+    """What the README says of the sockets of a node."""
+    first = 7400 + 250 * int(os.environ["ROS_DOMAIN_ID"])
+    with Bench():
+        rows = [line.split()[1].split(":") for line in Path("/proc/net/udp").read_text().splitlines()[1:]]
+    bound = {int(port, 16): address for address, port in rows if first <= int(port, 16) < first + 250}
+    assert first not in bound
+    assert set(bound.values()) == {"00000000"}

@@ -85,6 +85,10 @@ def test_help_names_topics_and_parameters_and_starts_nothing(capsys):
         "ros2 run testbed estimator [--ros-args --params-file MISSION.yaml ...]",
         "Puts gain times the first voltage into the age of its estimate",
         "  voltages  css_msgs/msg/CssVoltages",
+        "      frame_id: bus (io.body_frame; further ones: io.accepted_frames)",
+        "      qos_overrides./voltages.subscription.{history,depth,reliability,durability}",
+        "      qos_overrides./estimator/sun_estimate.publisher.{history,depth,reliability,durability}",
+        "Exit code: 0 told to end, or the flight is over; 1 it failed; 2 something given is wrong",
         "  gyro/imu  sensor_msgs/msg/Imu  (optional)",
         "  estimator/sun_estimate  css_msgs/msg/SunEstimate",
         "  *gain = 1.0",
@@ -95,8 +99,7 @@ def test_help_names_topics_and_parameters_and_starts_nothing(capsys):
 
 
 BAD = {
-    "value": (["-p", "gain:=11.0"], "estimator: gain: expected a number written with a point, at least 0"),
-    "assignment": (["-p", "gain=3.0"], "estimator: "),
+    "value": (["-p", "gain:=11.0"], "estimator: gain: 11.0 given, expected at least 0 and at most 10"),
 }
 
 
@@ -110,7 +113,29 @@ def test_bad_command_lines_end_at_once_with_code_2(start, bad):
     assert out == ""
 
 
+LONG = "n" * 300
 BAD_BEFORE_ROS = {
+    "no assignment": (["-p", "gain"], "estimator: -p gain: expected KEY:=VALUE\n"),
+    "no remapping": (["-r", "bad"], "estimator: -r bad: expected -r FROM:=TO, both names of topics, or -r __node"),
+    "no name of a topic": (["-r", "voltages:=1x"], "estimator: -r voltages:=1x: expected -r FROM:=TO, both names of "),
+    "no name of a node": (["-r", "__node:=a-b"], "estimator: -r __node:='a-b': expected at most 100 letters, digits"),
+    "a long name": (["-r", f"__node:={LONG}"], "estimator: -r __node:='nnn"),
+    "no namespace": (["-r", "__ns:=x"], "estimator: -r __ns:='x': expected at most 100 letters, digits and _"),
+    "a long namespace": (["-r", f"__ns:=/{LONG}"], "estimator: -r __ns:='/nnn"),
+    "unknown to ROS": (["-x"], "estimator: -x: unknown after --ros-args\n"),
+    "nothing after a flag": (["--params-file"], "estimator: Couldn't parse trailing --params-file flag"),
+    "unknown to the node": (["--", "--flag"], "estimator: '--flag': unknown, expected --help, --summary FILE or --ros"),
+    "level of the log": (["--log-level", "bogus"], "estimator: Couldn't parse log level: '--log-level bogus'. Error: "),
+    "mixed list": (["-p", "weights:=[1, 2.0]"], "estimator: -p weights:=[1, 2.0]: expected -p KEY:=VALUE, with the "),
+    "wrong type": (["-p", "gain:=3"], "estimator: gain: 3 given, expected a number written with a point, at least 0"),
+    "wrong together": (["-p", "floor:=3.0"], "estimator: floor: 3.0 given, expected at most the gain of 1.0\n"),
+    "wrong type of ROS's own": (["-p", "use_sim_time:=3"], "estimator: Trying to set parameter 'use_sim_time' to '3'"),
+    "depth of a queue": (
+        ["-p", "qos_overrides./voltages.subscription.depth:=-1"],
+        "estimator: qos_overrides./voltages.subscription.depth: -1 given, expected at least 1 and at most 1000000\n",
+    ),
+    "no file": (["--params-file", "/dev/zero"], "estimator: /dev/zero: cannot be read: expected a regular file\n"),
+    "folder": (["--params-file", "."], "estimator: .: cannot be read: expected a regular file\n"),
     "name": (["-p", "gian:=1.0"], "estimator: gian: unknown; did you mean gain?\n"),
     "name for this node": (["-p", "estimator:gian:=1.0"], "estimator: gian: unknown; did you mean gain?\n"),
     "file": (["--params-file", "missing.yaml"], "estimator: missing.yaml: cannot be read: "),
@@ -119,15 +144,42 @@ BAD_BEFORE_ROS = {
 
 
 @pytest.mark.parametrize("bad", BAD_BEFORE_ROS)
-def test_what_the_mission_reader_refuses_ends_with_one_line_and_code_2(bad, tmp_path, monkeypatch, capsys):
+def test_what_is_refused_at_the_start_ends_with_one_line_and_code_2(bad, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     Path("bad.yaml").write_text("/**: {ros__parameters: {io: {deadlin: 1.0}}}\n")
     arguments, reason = BAD_BEFORE_ROS[bad]
     with StopSignal():  # restores the handlers that the end of the process takes
         assert node_process.main(find_component("testbed", "estimator"), ["--ros-args", *arguments]) == 2
-    err = capsys.readouterr().err
+    err = capfd.readouterr().err
     assert err.startswith(reason)
     assert err.count("\n") == 1
+
+
+REFUSED_BY_ROS = {
+    "long topic": ["-r", f"voltages:={LONG}"],
+    "policy": ["-p", "qos_overrides./voltages.subscription.durability:=bogus"],
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED_BY_ROS)
+def test_topics_that_ros_does_not_make_are_one_line_and_code_2(start, kind):
+    code, out, err = start("estimator", "--ros-args", *REFUSED_BY_ROS[kind]).end()
+    assert (code, out, err.count("\n")) == (2, "", 1), err
+    assert "[estimator]: voltages: " in err
+
+
+def test_failure_of_a_component_at_the_start_is_code_1_and_a_refusal_code_2(start):
+    failed, refused = (start("estimator", "--ros-args", "-p", f"fault:={kind}") for kind in ("configure", "refuse"))
+    assert (failed.end()[0], refused.end()[0]) == (1, 2)
+
+
+def test_quality_of_service_of_a_topic_that_the_node_has_not_is_remarked(start, bench):
+    name = "qos_overrides./voltage.subscription.durability"
+    process = start("estimator", "--ros-args", "-p", f"{name}:=volatile")
+    remark = f"{name}: no topic of this node has it; did you mean qos_overrides./voltages.subscription.durability?"
+    bench.until(lambda: bench.logged(remark), "the remark")
+    process.popen.send_signal(signal.SIGINT)
+    assert process.end()[0] == 0
 
 
 @pytest.mark.parametrize("arguments", [["-p", "other:gian:=1.0"], ["-p", "use_sim_time:=true"], ["-p", "gain:=2.0"]])

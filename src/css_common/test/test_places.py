@@ -29,6 +29,7 @@ def test_everything_goes_into_the_project(monkeypatch, tmp_path):
     monkeypatch.setenv("SUNPOINT_HOME", str(tmp_path))
     assert places.results("bags") == tmp_path / "bags"
     assert places.scratch("kernels") == tmp_path / ".cache" / "kernels"
+    assert places.logs() == tmp_path / "log"
 
 
 def test_without_a_project_results_go_to_the_current_folder(monkeypatch, tmp_path):
@@ -42,7 +43,8 @@ def test_another_users_project_is_left_alone(another_users, monkeypatch, tmp_pat
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path))
     assert places.results("bags") == Path("bags")
-    assert places.scratch("log") == tmp_path / ".cache" / "sunpoint" / "log"
+    assert places.scratch("kernels") == tmp_path / ".cache" / "sunpoint" / "kernels"
+    assert places.logs() == tmp_path / ".cache" / "sunpoint" / "log"
 
 
 def test_a_user_without_any_folder_gets_one_that_no_other_can_write(another_users, monkeypatch, tmp_path):

@@ -69,3 +69,24 @@ def brightest(voltages) -> int:
             largest = voltages[i]
             index = i
     return index
+
+
+@kernel
+def missing_cells(voltages) -> int:
+    """Mask of the outputs that are missing (NaN)."""
+    mask = 0
+    for i in range(voltages.shape[0]):
+        if voltages[i] != voltages[i]:
+            mask |= 1 << i
+    return mask
+
+
+@kernel
+def is_opposed(layout: CellLayout, i: int, mask: int) -> bool:
+    """Whether a cell in `mask` looks away from cell `i`, by more than a right angle."""
+    cell = layout.cells[i]
+    for j in range(layout.cells.shape[0]):
+        other = layout.cells[j]
+        if mask >> j & 1 and cell.nx * other.nx + cell.ny * other.ny + cell.nz * other.nz < -_IN_PLANE:
+            return True
+    return False

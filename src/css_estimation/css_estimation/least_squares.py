@@ -29,7 +29,7 @@ from css_common.kernel import kernel
 from css_common.schema import Table, Values, choice, flag, real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, subtract
 from css_estimation import snapshot, sun_tracking
-from css_estimation.cell_layout import brightest
+from css_estimation.cell_layout import brightest, missing_cells
 from css_estimation.lit_cells import lit_cells
 from css_estimation.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun_heading import NO_COVARIANCE, Aiding, Covariance, SunHeading
@@ -173,7 +173,8 @@ def least_squares(p: LeastSquaresParameters, voltages, top: int) -> Snapshot:
         sigma = min(p.cell_sigma / voltages[top], _LARGEST_SIGMA) / length
         return Snapshot(sun_b, _covariance(sun_b, _sandwich(inverse, equations.squared, sigma)), mask, MODE_SPACE)
     found = find_pattern(p.patterns, mask)
-    if found >= 0:
+    # a cell whose output is missing may be lit: it is not one of the dark
+    if found >= 0 and missing_cells(voltages) == 0:
         mean, spread = dark_solution(p.patterns[found], rank, vectors[2], sun_b)
         # the outputs may contradict the pattern: then they decide
         if dot(mean, sun_b) > 0.0:

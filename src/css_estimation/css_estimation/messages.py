@@ -7,14 +7,30 @@ import numpy as np
 
 from css_common.attitude import mrp_to_quaternion
 from css_common.codec import Sample
+from css_common.component import Input
 from css_common.kernel import typed_call
+from css_common.readings import Readings
+from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
 from css_estimation.attitude_solution import VALIDITY_NONE, AttitudeSolution
 from css_estimation.error_covariance import CALIBRATION
 from css_estimation.sun_heading import SunHeading
+from css_msgs.msg import CssVoltages
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _to_quaternion = typed_call(mrp_to_quaternion)
+
+
+def cells_input(values: Values) -> Input:
+    """The outputs of the mission's cells, of which some may be missing (NaN)."""
+    cells = values.cells
+    return Input(
+        "cells",
+        "css/voltages",
+        CssVoltages,
+        lengths={"voltages": len(cells.normals)},
+        readings={"voltages": Readings(cells.smallest_reading, cells.largest_reading)},
+    )
 
 
 def sun_estimate_fields(heading: SunHeading) -> dict[str, Any]:

@@ -11,10 +11,10 @@ from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_estimation.eclipse_prediction import EclipsePrediction
-from css_estimation.messages import field_reading, gyro_reading, sun_estimate_fields
+from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields
 from css_estimation.mode_log import ModeLog
 from css_estimation.sun_heading import PREDICTION_UNKNOWN, Aiding
-from css_msgs.msg import CssVoltages, SunEstimate
+from css_msgs.msg import SunEstimate
 
 
 class SunEstimator(Component):
@@ -32,13 +32,8 @@ class SunEstimator(Component):
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         inputs = [
-            Input(
-                "cells",
-                "css/voltages",
-                CssVoltages,
-                lengths={"voltages": len(values.cells.normals)},
-            ),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
+            cells_input(values),
+            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), heeded=values.use_gyro),
         ]
         if values.rate.use_field:
             inputs.append(

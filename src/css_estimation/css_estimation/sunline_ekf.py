@@ -8,6 +8,9 @@ Which cells enter decides whether the filter works. Used are the cells that the 
 the Sun's view, whatever they read (a dark one says where the Sun is not), and those brighter than a gate
 relative to the brightest. A cell in neither class may be lit by the Earth alone, and is left out.
 
+Missing cells (NaN). A dark cell by itself says that the Sun is not in front of it; that it is just beside takes a cell
+that looks the other way and is dark too. Where that one is missing, the dark one is left out.
+
 Norm. The paper says nothing about the length of the state. Here it is set to one after each cycle, and the
 covariance is told so: tangent variance stays, variance along the Sun line becomes what tangent errors leave
 there, e^2/2, whose second moment is trace^2/2. Far from convergence the filter so stays the linear one that
@@ -26,7 +29,7 @@ from css_common.kernel import kernel
 from css_common.schema import Table, Values, choice, real
 from css_common.vectors import Vec3
 from css_estimation import sun_tracking
-from css_estimation.cell_layout import READABLE, CellLayout, brightest, cell_layout, sees
+from css_estimation.cell_layout import READABLE, CellLayout, brightest, cell_layout, is_opposed, missing_cells, sees
 from css_estimation.eclipse_detector import detect_eclipse
 from css_estimation.lit_cells import Gate
 from css_estimation.snapshot import MODE_NO_SUN
@@ -158,9 +161,12 @@ def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages,
     nis = 0.0
     mask = 0
     count = 0
+    missing = missing_cells(voltages)
     for i in range(voltages.shape[0]):
         v = voltages[i]
         if not (-READABLE < v < READABLE and (v > level or sees(p.layout, i, predicted_b))):
+            continue
+        if missing != 0 and v <= level and is_opposed(p.layout, i, missing):
             continue
         v = min(max(v, -_LARGEST_READING), _LARGEST_READING)
         normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)

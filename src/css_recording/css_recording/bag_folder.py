@@ -43,7 +43,9 @@ def prepare_folder(folder: Path, overwrite: bool) -> None:
         for path in sorted(contents, key=lambda path: path.name != METADATA_FILE):
             path.unlink()
     except OSError as error:
-        raise BagError(f"{folder}: cannot create the recording: {error.strerror}") from error
+        raise BagError(
+            f"{folder}: cannot create the recording: {error.strerror}; choose a folder in which you may write"
+        ) from error
 
 
 def create_file(path: Path) -> IO[bytes]:
@@ -67,6 +69,21 @@ def is_being_written(path: Path) -> bool:
         except OSError:
             return False
     return False
+
+
+def place_of(descriptor: int) -> Path | None:
+    """Where an open file is now, however it was renamed; None when it was deleted."""
+    if os.fstat(descriptor).st_nlink == 0:
+        return None
+    return Path(os.readlink(f"/proc/self/fd/{descriptor}"))
+
+
+def is_in_place(descriptor: int, path: Path) -> bool:
+    """Whether an open file is still what is found under its name."""
+    try:
+        return os.path.samestat(os.fstat(descriptor), path.stat())
+    except OSError:
+        return False
 
 
 def write_atomically(path: Path, text: str) -> None:

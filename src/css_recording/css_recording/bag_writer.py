@@ -2,39 +2,43 @@
 """Writes a recording: a rosbag2 folder with one MCAP file, from serialised messages and simulated stamps.
 
 The log time of a message is its stamp, never the wall clock, and nothing else in the file depends on when or
-where it was written. Messages are held until their simulated second is over, sorted by stamp and topic, and
-written as one chunk that is handed to the operating system at once. The same flight therefore gives the same
-bytes, in whatever order its messages arrived, and a killed recorder loses its open second and nothing more.
+where it was written. Messages are held until their span of simulated time is over, sorted by stamp and topic, and
+written as one chunk that is handed to the operating system at once. The same flight therefore gives the same bytes,
+in whatever order its messages arrived, and a killed recorder loses one simulated second (`second_buffer`).
 
 A finished recording is one that has a `metadata.yaml`: it is written last, under another name, and renamed.
 """
 
-import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from css_recording.bag_folder import prepare_folder, write_atomically
+from css_recording.bag_folder import free_name, is_in_place, place_of, prepare_folder, write_atomically
 from css_recording.bag_metadata import (
     METADATA_FILE,
     BagSummary,
+    FileSummary,
     Topic,
     absolute,
     bag_information,
     metadata_text,
+    ros_distro,
     serialized_metadata,
 )
 from css_recording.errors import BagError
 from css_recording.mcap_output import McapOutput
+from css_recording.provenance import SEAL, sealed
 from css_recording.schemas import MessageSchema, schema_of
 from css_recording.second_buffer import BufferLimits, Message, SecondBuffer
 
 METADATA_RECORD = "sunpoint"
 FLIGHT_RECORD = "sunpoint_flight"
 """Texts known at the end of a flight; `metadata.yaml` has them too, as `custom_data`."""
-ROS_DISTRO = "jazzy"  # where no ROS is sourced
+LAST_NS = (1 << 63) - 1
+"""No stamp of ROS is as late as this."""
+_SEALED_RECORDS = (METADATA_RECORD, FLIGHT_RECORD)
 
 
 class BagWriter:
@@ -50,7 +54,8 @@ class BagWriter:
     file_name: of the file, when it is not the folder's name.
 
     Every method raises `BagError` when the disk refuses. The recording is then over, and what was written
-    before can be recovered.
+    before can be recovered. So it does when the folder is moved or deleted under it: the recording is then finished
+    in its new place, or in a new folder beside the old one, and over too.
     """
 
     def __init__(
@@ -105,7 +110,7 @@ class BagWriter:
 
     @property
     def late_messages(self) -> int:
-        """Messages that came after their simulated second was on disk. They are kept, out of order."""
+        """Messages that came after their part of a simulated second was on disk. They are kept, out of order."""
         return self._buffer.late_messages
 
     @property
@@ -135,14 +140,15 @@ class BagWriter:
         """Record one serialised message.
 
         topic: absolute name of a topic that was added.
-        stamp_ns: [ns since 1970, simulated UTC] log time; not negative.
+        stamp_ns: [ns since 1970, simulated UTC] log time; not negative, and within 63 bits.
         data: little-endian CDR with its four-byte header.
         publish_time_ns: default: the stamp.
         """
         index = self._index.get(topic)
-        if index is None or stamp_ns < 0 or not self._open:
+        if index is None or not 0 <= stamp_ns <= LAST_NS or not self._open:
             self._check_open()
-            reason = "was not added to the recording" if index is None else f"stamp {stamp_ns} before 1970"
+            era = "before 1970" if stamp_ns < 0 else "is later than ROS can tell"
+            reason = "was not added to the recording" if index is None else f"stamp {stamp_ns} {era}"
             raise BagError(f"{self.folder}: topic {topic}: {reason}")
         publish_time_ns = stamp_ns if publish_time_ns is None else publish_time_ns
         batches = self._buffer.add((stamp_ns, index, data, publish_time_ns))
@@ -152,8 +158,10 @@ class BagWriter:
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Store a named set of texts at once, between the messages: an event, a parameter that changed."""
         self._check_open()
+        if name in _SEALED_RECORDS:
+            entries = sealed(entries)
         if name == FLIGHT_RECORD:
-            self._notes.update(entries)
+            self._notes.update((key, value) for key, value in entries.items() if key != SEAL)
         with self._disk():
             self._output.add_metadata(name, entries)
 
@@ -176,19 +184,20 @@ class BagWriter:
         if not self._open:
             return
         self.flush()
+        self._check_place()
         if notes:
             self.add_metadata(FLIGHT_RECORD, notes)
         self._finish()
 
-    def _finish(self) -> None:
+    def _finish(self, copy: Path | None = None) -> None:
         """Write what stands at the end of a recording."""
-        distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
-        summary = BagSummary(self.path.name, self._start_ns, self._end_ns, self._counts, distro, self._notes)
+        file = FileSummary(self.path.name, self._start_ns, self._end_ns, sum(self._counts))
+        summary = BagSummary([file], self._counts, ros_distro(), self._notes)
         information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
         with self._disk():
             # One record only: of several, some readers take the first and others the last.
             self._output.add_metadata("rosbag2", {"serialized_metadata": serialized_metadata(information)})
-            self._output.finish()
+            self._output.finish(copy)
             write_atomically(self.folder / METADATA_FILE, metadata_text(information))
         self._open = False
 
@@ -212,6 +221,25 @@ class BagWriter:
             self._end_ns = max(self._end_ns, batch[-1][0])
             with self._disk():
                 self._output.write_chunk(self._numbered(batch))
+        if batches:
+            self._check_place()
+
+    def _check_place(self) -> None:
+        """End the recording when its file is no longer where it was begun, and save what it holds."""
+        if is_in_place(self._output.descriptor, self.path) or self._failure:
+            return
+        place = place_of(self._output.descriptor)
+        what = f"{self.folder}: was {'deleted' if place is None else 'moved'} while it was being recorded"
+        self._open, self._failure = False, what
+        self._store(self._buffer.drain())
+        if place is None:
+            self.folder = free_name(self.folder.with_name(f"{self.folder.name}_rescued"))
+            prepare_folder(self.folder, overwrite=False)
+        self.path = place or self.folder / self.path.name
+        self.folder = self.path.parent
+        self._finish(copy=None if place else self.path)
+        self._failure = f"{what}; the {sum(self._counts)} messages until then are in {self.folder}"
+        raise BagError(self._failure)
 
     def _numbered(self, batch: list[Message]) -> Iterator[tuple[int, int, int, int, bytes]]:
         """Messages with the numbers of their channels and their places in them."""

@@ -20,6 +20,7 @@ from sensor_msgs.msg import Imu
 from css_common.codec import codec_of
 from css_common.epochs import format_utc
 from css_common.mission_file import dump_sections
+from css_common.sections import name_for_files
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
@@ -101,14 +102,15 @@ def import_telemetry(
 def mission_text(telemetry: Telemetry, layout: CellLayout, name: str, period_s: float, largest_step_s: float) -> str:
     """Mission file for replaying the telemetry; everything that it does not know keeps its default."""
     rows = telemetry.rows
+    period_s = min(max(period_s, _SHORTEST_PERIOD_S), _LONGEST_PERIOD_S)
     return dump_sections(
         {
             "/**": {
-                "mission.name": name,
+                "mission.name": name_for_files(name),
                 "mission.description": "imported telemetry",
                 "mission.epoch": format_utc(rows[0].stamp_ns),
                 "mission.duration": max((rows[-1].stamp_ns - rows[0].stamp_ns) * 1e-9, period_s),
-                "mission.period": min(max(period_s, _SHORTEST_PERIOD_S), _LONGEST_PERIOD_S),
+                "mission.period": period_s,
                 "cells.normals": [component for normal in layout.normals_b for component in normal],
                 "cells.field_of_view_deg": layout.field_of_view_deg,
                 "cells.clip_normal": list(layout.clip_normal_b),

@@ -113,7 +113,7 @@ class FlightRecorder:
             self.counters["answered_again"] += 1
             return stamp_ns
         self._received[topic] += 1
-        if stamp_ns <= 0:  # a driver that leaves its header empty
+        if stamp_ns <= 0 or nanoseconds >= 1_000_000_000:  # a driver that leaves its header empty, or fills it wrongly
             self._file_unstamped(topic, data)
             return None
         last_ns = self._last_ns.get(topic)

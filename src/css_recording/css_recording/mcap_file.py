@@ -4,51 +4,32 @@
 The library `mcap` parses the records that are few. Chunks and the messages in them, of which an orbit has a
 quarter of a million, are walked here with one `struct` call each, ten times as fast as through the library.
 The file is walked from its start to its last intact record and needs no index, so that the same code reads a
-finished recording and one whose recorder was killed.
+finished recording and one whose recorder was killed. After a record that is damaged the walk goes on at the next
+chunk, so that as much as possible can be saved; that something is damaged is never passed over.
 """
 
 import mmap
 import struct
 import zlib
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import lz4.frame
-import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
 
 from css_recording.errors import BagError
+from css_recording.mcap_checks import Ending, faults_of
+from css_recording.mcap_chunk import CHUNK_HEAD, MESSAGE_HEAD, RECORD_HEAD, Chunk, ChunkError, RawMessage, unpack, walk
 
 MAGIC = b"\x89MCAP0\r\n"
-_HEAD = struct.Struct("<BQ")
-_MESSAGE = struct.Struct("<BQHIQQ")  # head, channel, sequence, log time, publish time
-_CHUNK = struct.Struct("<QQQII")  # start, end, uncompressed size, CRC, length of the compression's name
-_MAX_CHUNK_BYTES = 1 << 30
+_MESSAGE_INDEX_HEAD = struct.Struct("<HI")  # channel, bytes that follow
 _LAST_OPCODE = int(Opcode.DATA_END)
 _FIRST_PRIVATE_OPCODE = 0x80
-
-
-class RawMessage(NamedTuple):
-    """A message as it stands in the file."""
-
-    log_time: int  # [ns]
-    channel_id: int
-    publish_time: int  # [ns]
-    data: bytes
-
-
-class Chunk(NamedTuple):
-    """Where a chunk stands in the file and what time it spans."""
-
-    start_ns: int
-    end_ns: int
-    position: int
-    size: int
+_COMPRESSION_NAMES = (b"\x04\0\0\0zstd", b"\x03\0\0\0lz4")
+_NAME_AT = RECORD_HEAD.size + CHUNK_HEAD.size - 4  # where the name of the compression stands in a chunk record
 
 
 class McapFile:
@@ -56,8 +37,11 @@ class McapFile:
 
     records: metadata, attachments, chunks and messages outside of chunks, in file order.
     complete: the file is finished: every record is intact and it ends as the format wants it.
-    has_end: its last bytes are those of a finished file; when it is not complete, it is damaged inside.
+    damage: what is wrong with the file other than its torn end, one text each; contents of chunks are not looked
+        into for it.
     torn_bytes: what follows the last intact record of an unfinished file.
+    private_records: records of types that the format leaves to applications, passed over.
+    has_check_sum: the file holds a check sum of everything that it records, and it is right.
     """
 
     def __init__(self, path: Path) -> None:
@@ -67,12 +51,23 @@ class McapFile:
         self.statistics: Statistics | None = None
         self.records: list[Metadata | Attachment | Chunk | RawMessage] = []
         self.profile = ""
-        self.complete = self.has_end = False
-        self.torn_bytes = 0
+        self.damage: list[str] = []
+        self.torn_bytes = self.private_records = 0
+        self.ending = Ending()
         self._map: mmap.mmap | bytes = _map_file(path)
         if self._map[: len(MAGIC)] != MAGIC:
             raise BagError(f"{path}: is not an MCAP file")
         self._walk()
+
+    @property
+    def complete(self) -> bool:
+        """The file is finished and nothing in it is known to be damaged."""
+        return self.ending.reached and not self.damage
+
+    @property
+    def has_check_sum(self) -> bool:
+        """The file holds a check sum of everything that it records, and it is right."""
+        return self.complete and self.ending.data_crc != 0
 
     def learn_channels(self) -> None:
         """Find channels that only the chunks define: those of a torn file, or of one without a summary."""
@@ -104,72 +99,103 @@ class McapFile:
 
     def chunk_messages(self, chunk: Chunk) -> list[RawMessage]:
         """Messages of a chunk in file order; `BagError` when it is damaged."""
-        raw = self._decompress(chunk)
-        messages: list[RawMessage] = []
-        append, unpack, new = messages.append, _MESSAGE.unpack_from, tuple.__new__
-        position, end = 0, len(raw)
-        while position < end:
-            if position + _MESSAGE.size <= end:
-                opcode, length, channel, _, log_time, publish_time = unpack(raw, position)
-            elif position + _HEAD.size <= end:
-                opcode, length = _HEAD.unpack_from(raw, position)
-                if opcode == Opcode.MESSAGE:
-                    raise self._damaged(chunk, "a message is cut short")
-            else:
-                raise self._damaged(chunk, "a record is cut short")
-            following = position + 9 + length
-            if following > end:
-                raise self._damaged(chunk, "a record is cut short")
-            if opcode == 5:  # Opcode.MESSAGE; the comparison with a plain number is what makes it fast
-                append(new(RawMessage, (log_time, channel, publish_time, raw[position + 31 : following])))
-            elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
-                self._learn(opcode, raw[position + 9 : following])
-            position = following
+        body = self._map[chunk.position + 9 : chunk.position + 9 + chunk.size]
+        try:
+            messages = walk(unpack(body), self._learn)
+            if messages and not self.ending.data_crc:  # nothing else vouches for the head of the chunk
+                times = [message[0] for message in messages]
+                if min(times) < chunk.start_ns or max(times) > chunk.end_ns:
+                    raise ChunkError("its messages are not of the time that it states")
+        except (ChunkError, McapError, struct.error, ValueError) as error:
+            raise BagError(f"{self.path}: the chunk at byte {chunk.position} is damaged: {error}") from error
         return messages
 
     def _walk(self) -> None:
         """Find all intact records."""
-        data, size = self._map, len(self._map)
         position = len(MAGIC)
-        opcode = 0
-        while True:
-            if position + _HEAD.size > size:
-                break
-            opcode, length = _HEAD.unpack_from(data, position)
-            following = position + 9 + length
-            if following > size or not self._take(opcode, position, length):
-                break
+        while not self.ending.reached:
+            following = self._read_record(position)
+            if following is None:
+                following = self._next_chunk(position)
+                if following is None:
+                    break
+                self.damage.append(f"{following - position} bytes at byte {position} are no records")
             position = following
-            if opcode == Opcode.FOOTER:
-                break
-        self.has_end = data[-len(MAGIC) :] == MAGIC and size > len(MAGIC)
-        self.complete = opcode == Opcode.FOOTER and data[position:] == MAGIC
-        self.torn_bytes = 0 if self.complete else size - position
+        rest = len(self._map) - position
+        tail = self._map[position : position + len(MAGIC)]
+        if self.ending.reached and tail != MAGIC and rest < len(MAGIC) and MAGIC.startswith(tail):
+            self.ending.reached = False  # the last of all writes was cut
+        elif self.ending.reached and (tail != MAGIC or rest > len(MAGIC)):
+            self.damage.append(f"{rest} bytes that do not belong to it follow its end")
+        if self.ending.reached:
+            self.damage += faults_of(self.ending, self.records, self.statistics, self.channels, self._map)
+            return
+        self.torn_bytes = rest
+        if self._map[-len(MAGIC) :] == MAGIC and len(self._map) > len(MAGIC):
+            self.damage.append(f"a record is damaged, {rest} bytes before the end")
 
-    def _take(self, opcode: int, position: int, length: int) -> bool:
-        """Remember one record; False when its contents cannot be what its head says."""
-        if opcode in (Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX) or opcode >= _FIRST_PRIVATE_OPCODE:
-            return True
-        if not 0 < opcode <= _LAST_OPCODE:
-            return False
-        if opcode == Opcode.CHUNK:
-            if length < _CHUNK.size:
-                return False
-            start_ns, end_ns, _, _, _ = _CHUNK.unpack_from(self._map, position + 9)
-            self.records.append(Chunk(start_ns, end_ns, position, length))
-            return True
+    def _read_record(self, position: int) -> int | None:
+        """Take the record at a position; gives where the next one begins, None when this is none."""
+        if position + RECORD_HEAD.size > len(self._map):
+            return None
+        opcode, length = RECORD_HEAD.unpack_from(self._map, position)
+        following = position + RECORD_HEAD.size + int(length)
+        known = 0 < opcode <= _LAST_OPCODE or opcode >= _FIRST_PRIVATE_OPCODE
+        if not known or following > len(self._map):
+            return None
         try:
-            body = self._map[position + 9 : position + 9 + length]
-            if opcode == Opcode.MESSAGE:
-                _, _, channel, _, log_time, publish_time = _MESSAGE.unpack_from(self._map, position)
-                self.records.append(RawMessage(log_time, channel, publish_time, body[22:]))
-            elif opcode in (Opcode.METADATA, Opcode.ATTACHMENT):
-                self.records.append(_parse(Metadata if opcode == Opcode.METADATA else Attachment, body))
-            else:
-                self._learn(opcode, body)
+            self._take(opcode, position, length)
         except (McapError, struct.error, ValueError):
-            return False
-        return True
+            self.damage.append(f"the record of type {opcode} at byte {position} is damaged")
+        return following
+
+    def _next_chunk(self, position: int) -> int | None:
+        """Where the next thing that looks like the head of a whole compressed chunk begins."""
+        candidates = []
+        for name in _COMPRESSION_NAMES:
+            found = self._map.find(name, position + _NAME_AT + 1)
+            while found >= 0:
+                start = found - _NAME_AT
+                opcode, length = RECORD_HEAD.unpack_from(self._map, start)
+                if opcode == Opcode.CHUNK and start + RECORD_HEAD.size + length <= len(self._map):
+                    candidates.append(start)
+                    break
+                found = self._map.find(name, found + 1)
+        return min(candidates, default=None)
+
+    def _take(self, opcode: int, position: int, length: int) -> None:
+        """Remember one record; an error of the parser when its contents cannot be what its head says."""
+        start = position + RECORD_HEAD.size
+        if opcode >= _FIRST_PRIVATE_OPCODE:
+            self.private_records += 1
+            return
+        if opcode == Opcode.MESSAGE_INDEX:
+            if _MESSAGE_INDEX_HEAD.unpack_from(self._map, start)[1] + _MESSAGE_INDEX_HEAD.size != length:
+                raise ValueError("its length is wrong")
+            return
+        if opcode == Opcode.CHUNK:
+            if length < CHUNK_HEAD.size:
+                raise ValueError("too short")
+            start_ns, end_ns, unpacked_size, _, _ = CHUNK_HEAD.unpack_from(self._map, start)
+            self.records.append(Chunk(start_ns, end_ns, position, length, unpacked_size))
+            return
+        body = self._map[start : start + length]
+        if opcode == Opcode.MESSAGE:
+            _, _, channel, _, log_time, publish_time = MESSAGE_HEAD.unpack_from(self._map, position)
+            self.records.append(RawMessage(log_time, channel, publish_time, body[22:]))
+        elif opcode == Opcode.METADATA:
+            self.records.append(_parse(Metadata, body))
+        elif opcode == Opcode.ATTACHMENT:
+            self._take_attachment(body)
+        elif not self.ending.take(opcode, position, body, _parse):
+            self._learn(opcode, body)
+
+    def _take_attachment(self, body: bytes) -> None:
+        attachment = _parse(Attachment, body)
+        crc = int.from_bytes(body[-4:], "little")
+        if crc and zlib.crc32(body[:-4]) != crc:
+            raise ValueError("its check sum is wrong")
+        self.records.append(attachment)
 
     def _learn(self, opcode: int, body: bytes) -> None:
         if opcode == Opcode.SCHEMA:
@@ -182,32 +208,6 @@ class McapFile:
             self.profile = _parse(Header, body).profile
         elif opcode == Opcode.STATISTICS:
             self.statistics = _parse(Statistics, body)
-
-    def _decompress(self, chunk: Chunk) -> bytes:
-        body = self._map[chunk.position + 9 : chunk.position + 9 + chunk.size]
-        try:
-            _, _, size, crc, name_length = _CHUNK.unpack_from(body)
-            name_end = _CHUNK.size + name_length
-            compression = body[_CHUNK.size : name_end].decode()
-            packed = body[name_end + 8 :]
-            if size > _MAX_CHUNK_BYTES or compression not in _DECOMPRESSORS:
-                raise self._damaged(chunk, f"compression '{compression}', size {size}")
-            raw = _DECOMPRESSORS[compression](packed, size)
-        except (zstandard.ZstdError, RuntimeError, ValueError, struct.error) as error:
-            raise self._damaged(chunk, str(error)) from error
-        if len(raw) != size or (crc and zlib.crc32(raw) != crc):
-            raise self._damaged(chunk, "its check sum is wrong")
-        return raw
-
-    def _damaged(self, chunk: Chunk, reason: str) -> BagError:
-        return BagError(f"{self.path}: the chunk at byte {chunk.position} is damaged: {reason}")
-
-
-_DECOMPRESSORS: dict[str, Callable[[bytes, int], bytes]] = {
-    "": lambda packed, size: packed,
-    "lz4": lambda packed, size: lz4.frame.decompress(packed),
-    "zstd": lambda packed, size: zstandard.decompress(packed, max_output_size=size),
-}
 
 
 def _parse(kind: Any, body: bytes) -> Any:

@@ -2,13 +2,17 @@
 """What software made a recording: the entries beside the mission in its record `sunpoint`."""
 
 import hashlib
+import json
 import os
 import platform
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 _LIBRARIES = ("css_recording", "css_sim", "css_estimation", "sunpoint_control", "numpy", "numba", "mcap")
 _LOCK_FILE = "requirements.lock"
+SEAL = "sha256"
+"""Entry that holds the check sums of those beside it."""
 
 
 def software_versions() -> dict[str, str]:
@@ -26,6 +30,28 @@ def software_versions() -> dict[str, str]:
     if lock.is_file():
         entries["lock_sha256"] = hashlib.sha256(lock.read_bytes()).hexdigest()
     return entries
+
+
+def sealed(entries: Mapping[str, str]) -> dict[str, str]:
+    """Entries of a record with the check sum (SHA-256) of each beside them."""
+    entries = {key: value for key, value in entries.items() if key != SEAL}
+    return entries | {SEAL: json.dumps({key: _digest(value) for key, value in entries.items()})}
+
+
+def broken_entries(entries: Mapping[str, str]) -> list[str]:
+    """Names of the entries that are not as they were sealed, or are missing; none when nothing was sealed."""
+    if SEAL not in entries:
+        return []
+    try:
+        stated = dict(json.loads(entries[SEAL]))
+    except (ValueError, TypeError, RecursionError):
+        return [SEAL]
+    found = {key: _digest(value) for key, value in entries.items() if key != SEAL}
+    return sorted(str(key) for key in stated.keys() | found.keys() if stated.get(key) != found.get(key))
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def _processor() -> str:

@@ -256,11 +256,7 @@ class RecorderNode(Node):
                 self._discovered.add(topic)
 
     def _missing(self, topics: Iterable[str]) -> list[str]:
-        return [
-            topic
-            for topic in topics
-            if topic not in self._refused and self._writers_of(topic) == 0
-        ]
+        return [topic for topic in topics if topic not in self._refused and self._writers_of(topic) == 0]
 
     def _writers_of(self, topic: str) -> int:
         subscription = self._subscribed.get(topic)
@@ -296,9 +292,7 @@ class RecorderNode(Node):
         if self._mission is None or topic not in self._names:
             # whose topic it is nobody knows, and some have many writers
             return self.create_subscription(message_type, topic, take, asked or offered, raw=True)
-        choice = writer_choice(
-            self._mission, self._names[topic], self.get_namespace(), only=self._in_flight or None
-        )
+        choice = writer_choice(self._mission, self._names[topic], self.get_namespace(), only=self._in_flight or None)
         qos = asked or (RECORDER_SUBSCRIPTION if self._in_flight else offered)  # not what a stranger offers
         hand_over = partial(self._recorder.hand_over, topic)
         return SoleSubscription(self, message_type, topic, take, qos, choice, on_hand_over=hand_over)

@@ -14,7 +14,9 @@ from typing import NamedTuple
 
 from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rosbags.interfaces import Nodetype
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.interfaces.typing import Typesdict
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from css_recording.errors import BagError
 
@@ -30,8 +32,9 @@ class MessageSchema(NamedTuple):
     """What a recording says about a message type."""
 
     type_name: str  # "std_msgs/msg/Header"
-    text: str  # definition with all dependencies, "ros2msg" encoding
+    text: str  # definition with all dependencies; empty when it is not known
     type_hash: str  # "RIHS01_..."; empty when the source of the definition did not say
+    encoding: str = "ros2msg"  # of the text: "ros2msg" or "ros2idl"
 
 
 def split_type_name(type_name: str) -> tuple[str, str]:
@@ -40,6 +43,11 @@ def split_type_name(type_name: str) -> tuple[str, str]:
     if len(parts) != 3 or parts[1] != "msg" or not all(parts):
         raise BagError(f"'{type_name}' is not a message type; expected PACKAGE/msg/NAME")
     return parts[0], parts[2]
+
+
+def full_type_name(type_name: str) -> str:
+    """The name with its "/msg/", which older recorders leave out."""
+    return type_name.replace("/", "/msg/") if type_name.count("/") == 1 else type_name
 
 
 def dependencies(type_name: str, text: str) -> list[str]:
@@ -75,27 +83,59 @@ def schema_of(type_name: str) -> MessageSchema:
     return MessageSchema(type_name, full_text, _installed_hash(type_name) or hash_of(type_name, full_text))
 
 
+def is_installed(type_name: str) -> bool:
+    """Whether the definition of a message type is there."""
+    try:
+        schema_of(type_name)
+    except BagError:
+        return False
+    return True
+
+
 def first_field_type(schema: MessageSchema) -> str | None:
     """Full name of the message type of the first field; None when it is no message, or there is no field."""
-    root = schema.text.split(_SEPARATOR, 1)[0]
-    _, fields = get_types_from_msg(root, schema.type_name)[schema.type_name]
+    _, fields = types_of(schema)[schema.type_name]
     if not fields or fields[0][1][0] != Nodetype.NAME:
         return None
     return str(fields[0][1][1])
 
 
-def hash_of(type_name: str, text: str) -> str:
-    """RIHS01 hash computed from a `ros2msg` schema text with all its dependencies."""
-    text = _CHAR.sub("uint8", text)  # what ROS 2 makes of it; rosbags would hash it as a type of its own
-    root, *others = text.split(f"{_SEPARATOR}\nMSG: ")
-    types = dict(get_types_from_msg(root, type_name))
-    for other in others:
-        name, _, definition = other.partition("\n")
-        package, base = name.strip().split("/")
-        types.update(get_types_from_msg(definition, f"{package}/msg/{base}"))
+def types_of(schema: MessageSchema) -> Typesdict:
+    """Constants and fields of a type and of all that it is made of, as `rosbags` writes them.
+
+    Raises `BagError` when the text cannot be understood.
+    """
+    try:
+        if schema.encoding == "ros2idl":
+            return _types_of_idl(schema.text)
+        text = _CHAR.sub("uint8", schema.text)  # what ROS 2 makes of it; rosbags has it as a type of its own
+        root, *others = text.split(f"{_SEPARATOR}\nMSG: ")
+        types = dict(get_types_from_msg(root, schema.type_name))
+        for other in others:
+            name, _, definition = other.partition("\n")
+            types.update(get_types_from_msg(definition, full_type_name(name.strip())))
+        return types
+    except (TypesysError, ValueError, RecursionError) as error:
+        raise BagError(f"message type {schema.type_name}: its definition cannot be understood") from error
+
+
+def _types_of_idl(text: str) -> Typesdict:
+    types: Typesdict = {}
+    for part in re.split(rf"^{_SEPARATOR}\nIDL: .*\n", text, flags=re.MULTILINE):
+        types.update(get_types_from_idl(part.removeprefix(_SEPARATOR)) if part.strip() else {})
+    return types
+
+
+def store_of(types: Typesdict) -> Typestore:
+    """A `rosbags` type store that holds these types alone."""
     store = get_typestore(Stores.EMPTY)
     store.register(types)
-    return str(store.hash_rihs01(type_name))
+    return store
+
+
+def hash_of(type_name: str, text: str) -> str:
+    """RIHS01 hash computed from a `ros2msg` schema text with all its dependencies."""
+    return str(store_of(types_of(MessageSchema(type_name, text, ""))).hash_rihs01(type_name))
 
 
 def _share_file(type_name: str, suffix: str) -> Path:

@@ -5,8 +5,7 @@ Each file is whole by itself: it has the definitions of all topics known when it
 an index and metadata of its own. `metadata.yaml`, which is written last, tells of all of them.
 """
 
-import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,12 +13,14 @@ from css_recording.bag_folder import write_atomically
 from css_recording.bag_metadata import (
     METADATA_FILE,
     BagSummary,
+    FileSummary,
     Topic,
     bag_information,
     metadata_text,
+    ros_distro,
     serialized_metadata,
 )
-from css_recording.bag_writer import ROS_DISTRO, BagWriter
+from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.mcap_output import McapOutput
 from css_recording.second_buffer import Message
@@ -54,7 +55,7 @@ class SplitBagWriter(BagWriter):
             options: as for `BagWriter`.
         """
         self._limits = files
-        self._finished: list[dict[str, Any]] = []  # what each finished file says of itself
+        self._finished: list[FileSummary] = []
         self._head: list[tuple[str, dict[str, str]]] = []
         self._file_start_ns = self._file_end_ns = 0
         self._counts_before: list[int] = []
@@ -97,35 +98,30 @@ class SplitBagWriter(BagWriter):
         for name, entries in self._head:
             super().add_metadata(name, entries)
 
-    def _finish_file(self) -> None:
+    def _finish_file(self, copy: Path | None = None) -> None:
         """Completes the file that is being written, with metadata as if it were the whole recording."""
         counts = self._in_this_file_by_topic()
         start_ns, end_ns = (self._file_start_ns, self._file_end_ns) if any(counts) else (0, 0)
-        distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
-        summary = BagSummary(self.path.name, start_ns, end_ns, counts, distro, self._notes)
-        information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
+        file = FileSummary(self.path.name, start_ns, end_ns, sum(counts))
+        information = self._information([file], counts)
         with self._disk():
             self._output.add_metadata("rosbag2", {"serialized_metadata": serialized_metadata(information)})
-            self._output.finish()
-        self._finished.append(information)
+            self._output.finish(copy)
+        self._finished.append(file)
 
-    def _finish(self) -> None:
+    def _finish(self, copy: Path | None = None) -> None:
         if not self._finished:
-            super()._finish()
+            super()._finish(copy)
             return
-        self._finish_file()
+        self._finish_file(copy)
         with self._disk():
-            write_atomically(self.folder / METADATA_FILE, metadata_text(self._information()))
+            information = self._information(self._finished, self._counts)
+            write_atomically(self.folder / METADATA_FILE, metadata_text(information))
         self._open = False
 
-    def _information(self) -> dict[str, Any]:
-        """What `metadata.yaml` says: the whole recording, and its files."""
-        distro = os.environ.get("ROS_DISTRO", ROS_DISTRO)
-        summary = BagSummary("", self._start_ns, self._end_ns, self._counts, distro, self._notes)
-        information = bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
-        for key in ("relative_file_paths", "files"):
-            information[key] = [entry for part in self._finished for entry in part[key]]
-        return information
+    def _information(self, files: Sequence[FileSummary], counts: Sequence[int]) -> dict[str, Any]:
+        summary = BagSummary(files, counts, ros_distro(), self._notes)
+        return bag_information(self._topics, [schema.type_hash for schema in self._schemas], summary)
 
     def _in_this_file_by_topic(self) -> list[int]:
         before = self._counts_before + [0] * (len(self._counts) - len(self._counts_before))

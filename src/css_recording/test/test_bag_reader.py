@@ -8,7 +8,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
-from css_recording.bag_reader import BagReader
+from css_recording.bag_reader import BagReader, Refused
 from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.schemas import schema_of
@@ -172,12 +172,24 @@ def test_mission_and_events_are_read_in_order(flight, tmp_path):
 
 @pytest.mark.parametrize(
     ("head", "words"),
-    [(b"\0\0\0\0", "big-endian"), (b"\0\3\0\0", "0003"), (b"\0\7\0\0", "0007"), (b"", "nothing")],
+    [
+        (b"\0\0\0\0", "it is big-endian; only little-endian CDR can be read"),
+        (b"\0\3\0\0", "it is encoded as 0003; only little-endian CDR can be read"),
+        (b"\0\7\0\0", "it is encoded as 0007; only little-endian CDR can be read"),
+        (b"", "it has 0 bytes, fewer than the head of a message"),
+        (b"\0\1\0", "it has 3 bytes, fewer than the head of a message"),
+    ],
 )
-def test_other_encodings_of_messages_are_refused(flight, tmp_path, head, words):
-    path = write_foreign(flight, tmp_path / "x.mcap", [("/css/voltages", 5, head + bytes(len(head)))])
-    with pytest.raises(BagError, match=f"/css/voltages at 5 ns.*{words}.*little-endian CDR"):
-        read(path)
+def test_malformed_messages_are_passed_over_counted_and_named(flight, tmp_path, head, words):
+    good = flight.messages(STEPS)
+    bad = [("/css/voltages", good[0][1] + number, head) for number in (1, 2, 3)]
+    path = write_foreign(flight, tmp_path / "x.mcap", [*good[:3], *bad, *good[3:]])
+    with BagReader(path, {"/css/voltages": "/cells"}) as reader:
+        assert [m.data for m in reader.messages()] == [data for _, _, data in good]
+        assert reader.refused == [Refused("/cells", words, 3, bad[0][1])]
+        assert str(reader.refused[0]) == f"/cells: 3 messages, the first at {bad[0][1]} ns: {words}"
+        assert len(list(reader.messages(["/gyro/imu"]))) == STEPS
+        assert reader.refused == []
 
 
 def test_other_encodings_of_channels_are_refused(flight, tmp_path):

@@ -63,8 +63,7 @@ def test_sigkill_costs_at_most_the_open_second(flight, tmp_path, seed, doctor):
     report = recover(folder)
     assert not report.was_complete
     kept = report.messages["/css/voltages"]
-    # the open second and the hold-back time of a fifth of a second
-    assert kept >= handed_over - 1.2 * STEPS_PER_SECOND
+    assert kept >= handed_over - STEPS_PER_SECOND
     expected = [("/css/voltages", step * 20_000_000, data + step.to_bytes(8, "little")) for step in range(kept)]
     assert contents(folder) == expected
     with BagReader(folder) as reader:
@@ -101,12 +100,13 @@ def test_no_truncation_crashes_recovery_or_makes_up_a_message(small, tmp_path):
     _, whole, messages = small
     torn = tmp_path / "torn.mcap"
     ranges = []
-    for length in range(len(whole) + 1):
+    for length in range(8):
         torn.write_bytes(whole[:length])
-        if length < 8:
-            with pytest.raises(BagError, match=r"torn\.mcap"):
-                recover(torn)
-            continue
+        with pytest.raises(BagError, match=r"torn\.mcap"):
+            recover(torn)
+    torn.write_bytes(whole)
+    for length in range(len(whole), 7, -1):
+        os.truncate(torn, length)
         file = McapFile(torn)
         seen = (file.records, file.schemas, file.channels, file.statistics, file.complete)
         file.close()
@@ -114,8 +114,8 @@ def test_no_truncation_crashes_recovery_or_makes_up_a_message(small, tmp_path):
             ranges.append((seen, [length]))
         ranges[-1][1].append(length)
     most = 0
-    for _, lengths in ranges:
-        for length in (lengths[0], lengths[-1]):
+    for _, lengths in reversed(ranges):
+        for length in (lengths[-1], lengths[0]):
             torn.write_bytes(whole[:length])
             report = recover(torn)
             kept = sum(report.messages.values())
@@ -138,7 +138,7 @@ def test_recovery_of_an_unclosed_folder_equals_closing_it(flight, tmp_path):
                 writer.add_metadata("event", {"step": "17"})
         writer.flush()
         if folder == closed:
-            writer.close()
+            writer.close({"recovery": "bag_0.mcap had no end: up to a second may be missing"})
         else:
             shutil.copytree(folder, tmp_path / "copy")  # while the recorder lives
     recover(tmp_path / "copy", killed.parent / "new" / "bag")
@@ -237,11 +237,11 @@ def test_random_damage_crashes_nothing(small, tmp_path):
 def test_what_cannot_be_recovered_is_refused(tmp_path):
     with pytest.raises(BagError, match="no such recording"):
         recover(tmp_path / "nowhere")
-    with pytest.raises(BagError, match=r"no \.mcap file"):
+    with pytest.raises(BagError, match=r"no \.mcap or \.db3 file"):
         recover(tmp_path)
     for name in ("a.mcap", "b.mcap"):
         (tmp_path / name).write_bytes(b"hello")
-    with pytest.raises(BagError, match="split into 2 files"):
+    with pytest.raises(BagError, match=r"a\.mcap: is not an MCAP file"):
         recover(tmp_path)
     with pytest.raises(BagError, match="not an MCAP file"):
         recover(tmp_path / "a.mcap")

@@ -3,6 +3,7 @@
 
 import random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -44,21 +45,26 @@ def test_nothing_is_lost_or_made_up_for_any_stamps(messages):
         assert [message[:2] for message in batch] == sorted(message[:2] for message in batch)
 
 
-def test_each_second_is_one_batch_and_comes_out_when_it_is_over():
+def test_each_span_is_one_batch_and_comes_out_when_it_is_over():
     buffer = SecondBuffer(LIMITS)
-    for message in regular(12):
+    for message in regular(10):
         assert not buffer.add(message)
-    (batch,) = buffer.add(regular(13)[-1])
-    assert batch == regular(10)
+    (batch,) = buffer.add(regular(11)[-1])
+    assert batch == regular(8)
     assert len(buffer.held()) == 2 * 3 + 1
 
 
-def test_what_is_held_stays_below_a_second_and_the_hold_back_time():
-    buffer = SecondBuffer(LIMITS)
+@pytest.mark.parametrize(
+    ("hold_back_steps", "most_ns"), [(0, SECOND_NS), (2, SECOND_NS), (5, SECOND_NS), (20, SECOND_NS * 5 // 2)]
+)
+def test_what_is_held_spans_less_than_a_second_or_the_hold_back_time_and_half_of_one(hold_back_steps, most_ns):
+    buffer = SecondBuffer(BufferLimits(hold_back_ns=hold_back_steps * STEP_NS))
+    most = 0
     for message in regular(500):
         buffer.add(message)
         stamps = [held[0] for held in buffer.held()]
-        assert not stamps or max(stamps) - min(stamps) <= SECOND_NS + LIMITS.hold_back_ns
+        most = max(most, max(stamps) - min(stamps) if stamps else 0)
+    assert most == most_ns - STEP_NS
 
 
 def test_late_messages_are_kept_apart_counted_and_not_held_back():
@@ -73,11 +79,11 @@ def test_a_stray_stamp_of_the_future_splits_one_second_and_disturbs_no_other():
     messages = regular(40)
     stray = (10**6 * SECOND_NS, 0, b"", 0)
     batches, late = run([*messages[:5], stray, *messages[5:]])
-    assert late == 25
-    assert batches[:2] == [messages[:5], messages[30:60]]
-    assert batches[2] == messages[5:30]
+    assert late == 19  # the rest of the span of 0.8 s that the stray stamp ended
+    assert batches[:2] == [messages[:5], messages[24:48]]
+    assert batches[2] == messages[5:24]
     assert batches[-1] == [stray]
-    assert [message for batch in batches[3:-1] for message in batch] == messages[60:]
+    assert [message for batch in batches[3:-1] for message in batch] == messages[48:]
 
 
 def test_a_flood_within_one_second_is_handed_out_in_parts():

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from css_common.codec import Sample, codec_of
-from css_common.component import Outgoing, Plant, messages_of
-from css_common.mission import Event, Mission, MissionError, Node
-from css_common.schema import shaped_values, unknown_name
+from css_common.component import Outgoing, Plant
+from css_common.mission import Mission, MissionError, Node
+from css_common.schema import unknown_name
+from css_common.stepping import Stepper
 from css_studies.flight_log import LOGGED_TYPES, FlightLog
 from css_studies.message_columns import Columns
 
@@ -78,8 +79,8 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
 def _fly(mission: Mission, wires: "Wires") -> None:
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
-    plant.apply_events(stamp_ns)
-    clockwork = plant.component
+    plant.stepper.apply_due(stamp_ns)
+    clockwork = plant.stepper.component
     assert isinstance(clockwork, Plant)
     outgoing = clockwork.begin()
     while not clockwork.finished:
@@ -87,9 +88,9 @@ def _fly(mission: Mission, wires: "Wires") -> None:
         plant.publish(outgoing, wires, bus)
         for part in others:
             part.answer(stamp_ns, wires, bus)
-        outgoing = plant.component.cycle(stamp_ns, plant.received(bus))
+        outgoing = clockwork.cycle(stamp_ns, plant.received(bus))
         stamp_ns += mission.period_ns
-        plant.apply_events(stamp_ns)
+        plant.stepper.apply_due(stamp_ns)
 
 
 class _Wire:
@@ -156,27 +157,19 @@ _LOGGED = frozenset(LOGGED_TYPES.values())
 
 
 class _Part:
-    """A component of the flight with its wiring and what is to happen to it."""
+    """A component of the flight with its wiring."""
 
     def __init__(self, node: Node, mission: Mission) -> None:
-        self.component = node.component(node.name, node.values)
+        self.stepper = Stepper(node.component, node.name, node.canonical, mission.events, mission.epoch_ns)
         self._inputs = [(i.key, i.topic) for i in node.inputs]
         self._required = [(i.topic, i.divider) for i in node.inputs if i.required]
-        self._topics = {output.key: output.topic for output in node.outputs}
-        self._canonical = dict(node.canonical)
-        self._events: list[Event] = [event for event in mission.events if event.node == node.name]
-        self._epoch_ns = mission.epoch_ns
-        self._is_active = True
 
     def answer(self, stamp_ns: int, wires: Wires, bus: dict[str, Sample]) -> None:
         """One cycle; none when an input that is due did not come."""
         for topic, divider in self._required:
-            if topic not in bus and self.component.step_of(stamp_ns) % divider == 0:
+            if topic not in bus and self.stepper.component.step_of(stamp_ns) % divider == 0:
                 return
-        if self._events:
-            self.apply_events(stamp_ns)
-        cycle = self.component.cycle if self._is_active else self.component.idle
-        self.publish(cycle(stamp_ns, self.received(bus)), wires, bus)
+        self.publish(self.stepper.step(stamp_ns, self.received(bus)), wires, bus)
 
     def received(self, bus: Mapping[str, Sample]) -> dict[str, Sample | None]:
         """The inputs of the step, None for what did not come."""
@@ -184,23 +177,8 @@ class _Part:
 
     def publish(self, outgoing: Outgoing, wires: Wires, bus: dict[str, Sample]) -> None:
         """Send what a component gave."""
-        for key, sample in messages_of(outgoing):
-            topic = self._topics[key]
-            bus[topic] = wires[topic].carry(sample)
-
-    def apply_events(self, stamp_ns: int) -> None:
-        """What the mission scripts for this component up to a stamp."""
-        elapsed = (stamp_ns - self._epoch_ns) / 1e9
-        while self._events and elapsed >= self._events[0].time - 1e-9:
-            event = self._events.pop(0)
-            if event.action == "set":
-                self._canonical[event.parameter] = event.value
-                self.component.tune(shaped_values(self.component.table(), self._canonical))
-            elif event.action == "deactivate":
-                self._is_active = False
-            elif not self._is_active:
-                self._is_active = True
-                self.component.configure()
+        for port, sample in self.stepper.checked(outgoing):
+            bus[port.topic] = wires[port.topic].carry(sample)
 
 
 def _in_order(mission: Mission) -> list[Node]:

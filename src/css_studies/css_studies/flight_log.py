@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from css_common.attitude import mrp_to_dcm
-from css_common.codec import DecodeError, codec_of
+from css_common.codec import Codec, DecodeError, codec_of
 from css_common.kernel import kernel
 from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
@@ -31,6 +31,9 @@ from css_msgs.msg import (
 )
 from css_recording.errors import BagError
 from css_studies.message_columns import Columns, stack
+
+IMPORTED_FROM = "imported_from"
+"""Entry in the description of a recording that was made of a table of telemetry."""
 
 SUNLIT_FRACTION = 0.5
 """The flight is sunlit while more than this fraction of the solar disc is in view."""
@@ -84,6 +87,8 @@ class FlightLog:
         attitudes: name of the attitude filter to `AttitudeEstimate` columns.
         voltages, wheels, torque_command, control: columns of the topic, None when there is none.
         notes: what could not be read, one line each.
+        imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
+            arrays of its mission are defaults that nobody gave.
     """
 
     origin: str
@@ -96,6 +101,7 @@ class FlightLog:
     torque_command: Columns | None = None
     control: Columns | None = None
     notes: list[str] = field(default_factory=list)
+    imported: bool = False
 
     def columns(self) -> list[Columns]:
         """All columns of the log, none of them empty."""
@@ -228,12 +234,14 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         remap: new names of topics, as `BagReader` takes them.
 
     Raises:
-        BagError: it cannot be read, holds a damaged message, or none of the types that a flight is made of.
+        BagError: it cannot be read, holds a topic of another definition of its type, or none of the types that a
+            flight is made of. Damaged messages are left out and noted.
     """
     from css_recording.bag_reader import BagReader  # a quarter of a second that studies without bags need not pay
 
     with BagReader(path, remap) as reader:
         mission, notes = None, []
+        imported = IMPORTED_FROM in reader.description
         text = reader.mission_text
         if text is not None:
             try:
@@ -250,13 +258,30 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         append = {topic: received.append for topic, (_, received) in messages.items()}
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
-    log = FlightLog(str(path), mission, notes=notes)
+        notes += [*reader.notes, *map(str, reader.refused)]
+    log = FlightLog(str(path), mission, notes=notes, imported=imported)
     for topic, (message_type, received) in messages.items():
-        try:
-            log.add(topic, message_type, stack(codec_of(message_type), received).sorted())
-        except DecodeError as error:
-            raise BagError(f"{path}: topic {topic}: {error}") from error
+        log.add(topic, message_type, _whole(topic, codec_of(message_type), received, notes).sorted())
     return log
+
+
+def _whole(topic: str, codec: Codec, received: list[bytes], notes: list[str]) -> Columns:
+    """Columns of the messages that are whole; others are left out and noted."""
+    try:
+        return stack(codec, received)
+    except DecodeError as error:
+        good = [data for data in received if _decodes(codec, data)]
+        count = len(received) - len(good)
+        notes.append(f"topic {topic}: {count} of {len(received)} messages left out: {error}")
+        return stack(codec, good)
+
+
+def _decodes(codec: Codec, data: bytes) -> bool:
+    try:
+        codec.decode(data)
+    except DecodeError:
+        return False
+    return True
 
 
 def estimator_of(topic: str) -> str:

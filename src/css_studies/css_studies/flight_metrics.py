@@ -6,6 +6,9 @@ Everything is measured against the truth; without a truth in the log every quant
 sunlit          more than half of the solar disc is in view (truth.illumination > 0.5).
 power positive  the true Sun is within 30 deg of the array normal.
 acquisition     the first moment from which the flight stays sunlit and power positive for 60 s.
+
+Imported telemetry says nothing about solar arrays and orbit: nothing is told of pointing and acquisition, and errors
+of estimates count over all of its lines.
 """
 
 from collections.abc import Iterable
@@ -111,22 +114,30 @@ def sunlit_passes(log: FlightLog) -> list[Pass]:
 
 
 def _flight_quantities(log: FlightLog) -> Run:
+    unknown: Run = dict.fromkeys(
+        ("power_positive_s", "pointing_error_mean_deg", "pointing_error_sunlit_deg", "rate_final_deg_s")
+    )
     if log.truth is None:
-        return dict.fromkeys(
-            ("power_positive_s", "pointing_error_mean_deg", "pointing_error_sunlit_deg", "rate_final_deg_s")
-        )
+        return unknown
+    if log.imported:
+        # a table without rates has zeros there
+        return unknown | ({"rate_final_deg_s": _final_rate(log)} if np.any(log.truth.omega_bn_b) else {})
     away = log.pointing_error > POWER_POSITIVE
     start = acquisition(log)
     counted = _counted(log, start)
-    time = log.time(log.truth)
     return {
         "power_positive_s": float(np.count_nonzero(away & log.sunlit)) * log.period
         if np.any(~away & log.sunlit)
         else None,
         "pointing_error_mean_deg": _mean_deg(log.pointing_error[counted]),
         "pointing_error_sunlit_deg": _mean_deg(log.pointing_error[log.sunlit]),
-        "rate_final_deg_s": _mean_deg(log.rate[time > time[-1] - FINAL_TIME + 0.01 * log.period]),
+        "rate_final_deg_s": _final_rate(log),
     }
+
+
+def _final_rate(log: FlightLog) -> float | None:
+    time = log.time(log.having("truth"))
+    return _mean_deg(log.rate[time > time[-1] - FINAL_TIME + 0.01 * log.period])
 
 
 def _heading_quantities(log: FlightLog, name: str) -> Run:
@@ -169,6 +180,8 @@ def _steps_without_estimate(log: FlightLog, name: str) -> int | None:
 def _counted(log: FlightLog, start: int | None) -> np.ndarray:
     """(M,) True at the sunlit steps from acquisition on."""
     counted = log.sunlit.copy()
+    if log.imported:
+        return counted
     counted[: len(counted) if start is None else start] = False
     return counted
 

@@ -179,6 +179,7 @@ def test_the_command_names_holes(capsys):
         (["--set", "cells.field_of_view_deg=wide"], "cells.field_of_view_deg"),
         (["--set", "cells.field_of_view_deg=200"], "at most 180"),
         (["--figures", "/proc/nowhere"], "/proc/nowhere"),
+        (["esprit_2006"], "no cells to map: graph.nodes has no css_sim/css_array"),
     ],
 )
 def test_what_the_user_got_wrong_is_one_line(arguments, expected, capsys):

@@ -60,9 +60,28 @@ WRONG = {
     "too many cases": (["--first-case", "4294967295"], "expected cases below 2**32"),
     "threads": (["--threads", "0"], "--threads: 0 given, expected at least 1"),
     "sample": (["--sample", "0"], "--sample: 0 given, expected seconds above 0"),
-    "duration": (["--duration", "-5"], "mission.duration: -5.0 given, expected a number"),
+    "duration": (["--duration", "-5"], "mission.duration: -5.0 given, expected above 0 and at most 3.2e+07 [s]"),
+    "seed": (["--seed", "-1"], "mission.seed: -1 given, expected at least 0"),
+    "estimator with a typo": (["--estimators", "efk"], "did you mean css_estimation/ekf?"),
+    "name of a file": (["--sweep", "mission.name=../x,b"], "mission.name: '../x' given, expected a name for files"),
     "folder": (["--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
 }
+
+
+UNCOVERED = {
+    "cubesat_vmm": "graph.nodes has no sunpoint_control/mrp_control, a Sun estimator; fly it on the graph",
+    "esprit_2006": "graph.nodes has no css_sim/dynamics, css_sim/css_array, sunpoint_control/mrp_control, a Sun",
+}
+
+
+@pytest.mark.parametrize("mission", UNCOVERED)
+def test_mission_that_is_not_covered_is_said_before_anything_starts(mission, tmp_path, capsys):
+    for arguments in ([], ["--estimators", "ekf"], ["--gyro", "off"]):
+        assert main([mission, "--out", str(tmp_path / "s"), *arguments]) == 2
+        err = capsys.readouterr().err
+        assert f"{mission}.yaml: the Monte Carlo does not cover this mission: {UNCOVERED[mission]}" in err
+        assert err.startswith("monte-carlo: ") and err.count("\n") == 1
+        assert not (tmp_path / "s").exists()
 
 
 @pytest.mark.parametrize("what", WRONG)

@@ -88,7 +88,9 @@ def _run(arguments: argparse.Namespace) -> int:
     print_incidents(flight)
     if arguments.json:
         print_json(flight_object(flight, runs))
-    return FAILED if missed or flight.notes else 0
+    for line in replayed.shortcomings:
+        complain("not as it should be:", line)
+    return FAILED if missed or flight.notes or replayed.shortcomings else 0
 
 
 if __name__ == "__main__":

@@ -11,8 +11,8 @@ from css_common.run import node_main
 from css_common.schema import Values
 from css_estimation import attitude_ekf, attitude_options, attitude_solution, flight_references
 from css_estimation.flight_references import FlightReferences
-from css_estimation.messages import attitude_estimate_fields, field_reading, gyro_reading
-from css_msgs.msg import AttitudeEstimate, CssVoltages
+from css_estimation.messages import attitude_estimate_fields, cells_input, field_reading, gyro_reading
+from css_msgs.msg import AttitudeEstimate
 
 
 class AttitudeFilter(Component):
@@ -24,8 +24,8 @@ class AttitudeFilter(Component):
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         return (
-            Input("cells", "css/voltages", CssVoltages, lengths={"voltages": len(values.cells.normals)}),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",)),
+            cells_input(values),
+            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), heeded=values.use_gyro),
             Input(
                 "field",
                 "mag/field",

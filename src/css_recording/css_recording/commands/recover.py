@@ -8,11 +8,13 @@ from pathlib import Path
 from css_common.command import USAGE, command_parser, complain, guarded
 from css_common.progress_lines import still_working
 from css_recording.errors import BagError
-from css_recording.recovery import RecoveryReport, recover
+from css_recording.recovery import recover
+from css_recording.salvage import RecoveryReport
 
 _DESCRIPTION = """\
 Finish a recording whose recorder was killed: keep every intact chunk, index it, and write the metadata that
-the recorder had no time for. A complete recording is left as it is."""
+the recorder had no time for. A folder whose metadata.yaml is lost or wrong gets a new one. A complete recording is
+left as it is; one that is damaged elsewhere than at its end is refused unless an output is named."""
 
 _EXAMPLES = ("bags/FLIGHT", "bags/FLIGHT -o bags/mended")
 _EXITS = {0: "the recording is complete (now)", 1: "it cannot be recovered", 2: "there is none, or an option is wrong"}
@@ -45,12 +47,8 @@ def _summary(report: RecoveryReport) -> str:
     state = "was complete" if report.was_complete else "recovered"
     lines = [f"{report.recording}: {state}, {total} messages"]
     lines += [f"  {count:9d}  {topic}" for topic, count in report.messages.items()]
-    if report.torn_bytes:
-        lines.append(f"lost: the last {report.torn_bytes} bytes, which were being written")
-    if report.damaged_chunks:
-        lines.append(f"lost: {report.damaged_chunks} damaged chunks")
-    if report.refused_messages:
-        lines.append(f"left out: {report.refused_messages} messages that are not ROS 2 messages")
+    lines += [f"lost: {loss}" for loss in report.losses]
+    lines += [f"note: {note}" for note in report.notes]
     return "\n".join(lines)
 
 

@@ -49,6 +49,11 @@ class CssArray(Component):
         yield from earth_reflectivity.conflicts(values)
         if values.output_low >= values.output_high:
             yield f"output_low: {values.output_low:g} given, expected less than output_high"
+        # estimators would take for missing what these cells put out
+        if values.output_low < values.cells.smallest_reading:
+            yield f"output_low: {values.output_low:g} given, expected at least cells.smallest_reading"
+        if values.output_high > values.cells.largest_reading:
+            yield f"output_high: {values.output_high:g} given, expected at most cells.largest_reading"
 
     def configure(self) -> None:
         values = self.values

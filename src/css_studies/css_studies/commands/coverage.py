@@ -13,6 +13,7 @@ from rich.console import Console
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
+from css_sim.nodes.css_array import CssArray
 from css_studies.coverage import grid_of, layout_of_mission, map_cells
 from css_studies.coverage_figures import write_coverage_figures
 from css_studies.coverage_statistics import coverage_object
@@ -70,8 +71,11 @@ def study(mission: Mission, figures: Path | None = None) -> tuple[dict[str, Any]
     """Numbers of a mission's layout, and the figures written.
 
     Raises:
+        MissionError: the mission has no cells.
         OSError: a figure cannot be written.
     """
+    if not any(issubclass(node.component, CssArray) for node in mission.nodes):
+        raise MissionError(f"{mission.origin}: no cells to map: graph.nodes has no css_sim/css_array")
     grid, layout = grid_of(mission), layout_of_mission(mission)
     normals_b = mission.values.cells.normals
     ideal, warped = map_cells(layout, grid), map_cells(layout, grid, warp=True)

@@ -23,6 +23,7 @@ from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_studies.monte_carlo import Configuration, Study, StudyError, run_study
+from css_studies.monte_carlo.mission_flight import refuse_uncovered
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.schedulers import DaskScheduler
 from css_studies.monte_carlo.study_summary import study_object
@@ -82,7 +83,10 @@ def _run(options: argparse.Namespace) -> int:
     if options.seed is not None:
         overrides.append(f"mission.seed={options.seed}")
     mission = load_mission(options.mission, overrides)
+    refuse_uncovered(mission)
     configurations = _configurations(mission, options)
+    for remark in mission.remarks:
+        print(f"monte-carlo: {remark}", file=sys.stderr)
     folder = options.out or _default_folder(mission.name)
     messages = Console(stderr=True, highlight=False)
     begin = time.perf_counter()

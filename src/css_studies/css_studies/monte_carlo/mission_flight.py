@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A mission as the compiled loop flies it: which node plays which part, its parameters, the events that change them."""
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
 from types import ModuleType
@@ -13,6 +12,7 @@ from css_common.component import Component
 from css_common.mission import Event, Mission, MissionError, Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values, default_values, shaped_values
+from css_common.stepping import first_step
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
@@ -48,6 +48,30 @@ class Stretch(NamedTuple):
     end: int  # the step after the last
     vehicle: Vehicle
     cases: Cases
+
+
+_FLOWN = {
+    Dynamics: "css_sim/dynamics",
+    CssArray: "css_sim/css_array",
+    MrpControl: "sunpoint_control/mrp_control",
+}
+
+
+def refuse_uncovered(mission: Mission) -> None:
+    """Looks whether the compiled loop has a place for a mission, before anything of it is changed.
+
+    Raises:
+        MissionError: it has none.
+    """
+    kinds = [node.component for node in mission.nodes]
+    estimators = [node.name for node in mission.nodes if issubclass(node.component, SunEstimator)]
+    missing = [name for kind, name in _FLOWN.items() if kind not in kinds]
+    if missing or not estimators:
+        lacks = ", ".join([*missing, *([] if estimators else ["a Sun estimator"])])
+        raise MissionError(
+            f"{mission.origin}: the Monte Carlo does not cover this mission: graph.nodes has no {lacks}; "
+            "fly it on the graph"
+        )
 
 
 class MissionFlight:
@@ -98,9 +122,7 @@ class MissionFlight:
 
     def stretches(self, cases: Cases) -> Iterator[Stretch]:
         """The stretches between scripted events, in order."""
-        # the step whose time has come, as nodes and `css_studies.direct_flight` judge it
-        period_ns = self.mission.period_ns
-        begins = [max(0, math.ceil((event.time - 1e-9) * 1e9 / period_ns - 1e-9)) for event in self.mission.events]
+        begins = [first_step(event, self.mission.period_ns) for event in self.mission.events]
         bounds = sorted({0, *(b for b in begins if b < self.steps), self.steps})
         for first, end in pairwise(bounds):
             done = [event for event, begin in zip(self.mission.events, begins, strict=True) if begin <= first]

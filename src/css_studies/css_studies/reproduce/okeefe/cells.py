@@ -7,7 +7,6 @@ import numpy as np
 
 from css_common.attitude import dcm_to_mrp
 from css_common.codec import Sample
-from css_common.component import messages_of
 from css_common.mission import Mission
 from css_common.random_streams import random_key
 from css_common.vectors import mat3
@@ -68,7 +67,9 @@ class Cells:
             solar_flux=surroundings.solar_flux,
             illumination=surroundings.illumination,
         )
-        return dict(messages_of(self._component.cycle(stamp_ns, {"truth": truth})))["voltages"].voltages
+        voltages = self._component.cycle(stamp_ns, {"truth": truth})["voltages"]
+        assert isinstance(voltages, Sample)  # an output of each step
+        return voltages.voltages
 
 
 def response(mission: Mission) -> Response:

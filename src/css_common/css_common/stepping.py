@@ -1,0 +1,186 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stepping a component: its values in force, active or idle, scripted events when they are due, checked messages out.
+
+Live nodes, flights in one process and replay step components through this and nothing else, so that what happens to
+a component in flight happens to it everywhere.
+"""
+
+import copy
+import math
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from css_common import sections
+from css_common.codec import Codec, Sample, codec_of
+from css_common.component import Component, Outgoing, Received
+from css_common.mission import Event
+from css_common.schema import ParameterError, shaped_values
+
+# Times of events are decimal seconds, stamps whole nanoseconds.
+_SLACK_S = 1e-9
+
+
+def is_due(event: Event, elapsed_ns: int) -> bool:
+    """Whether the time of a scripted event has come, so long after the mission's epoch [ns]."""
+    return elapsed_ns / 1e9 >= event.time - _SLACK_S
+
+
+def first_step(event: Event, period_ns: int) -> int:
+    """Number of the first control cycle at which an event is due."""
+    step = max(0, math.floor(event.time * 1e9 / period_ns) - 1)
+    while not is_due(event, step * period_ns):
+        step += 1
+    return step
+
+
+def conflict(component_type: type[Component], canonical: Mapping[str, Any]) -> str | None:
+    """The first thing that is wrong between values that are each sane, or None."""
+    values = shaped_values(component_type.table(), canonical)
+    return next((reason for reason in (*sections.conflicts(values), *component_type.conflicts(values))), None)
+
+
+class Port(NamedTuple):
+    """Where messages of one output of a component go."""
+
+    key: str
+    topic: str
+    codec: Codec
+    real_fields: list
+
+
+def _raise(error: Exception) -> None:
+    raise error
+
+
+class Stepper:
+    """One component as it is stepped.
+
+    Attributes:
+        component: what is stepped.
+        canonical: its values in force.
+        ports: its outputs by key.
+        is_active: it cycles; else it is idle.
+        perform: called with each event that is due; `apply` unless a host has its own way to do it.
+        tuned: called after each change of values.
+        failed: called with what the component raises when it takes new values; raises it unless replaced.
+        withheld: called with topic and field of a message that is not finite and therefore does not go out.
+    """
+
+    def __init__(
+        self,
+        component_type: type[Component],
+        name: str,
+        canonical: Mapping[str, Any],
+        events: Iterable[Event] = (),
+        epoch_ns: int = 0,
+    ) -> None:
+        """Builds the component, active.
+
+        Args:
+            component_type: what to step.
+            name: of its node.
+            canonical: checked values of all its parameters.
+            events: scripted changes; those of other nodes are left out.
+            epoch_ns: stamp from which events count.
+        """
+        self.canonical = dict(canonical)
+        self.component = component_type(name, shaped_values(component_type.table(), self.canonical))
+        self.ports = {
+            output.key: Port(output.key, output.topic, codec, codec.real_fields())
+            for output in component_type.outputs(name, self.component.values)
+            for codec in (codec_of(output.message_type),)
+        }
+        self.is_active = True
+        self.perform: Callable[[Event], None] = self.apply
+        self.tuned: Callable[[], None] = lambda: None
+        self.failed: Callable[[Exception], None] = _raise
+        self.withheld: Callable[[str, str], None] = lambda topic, field: None
+        self._begins_anew = False
+        self._epoch_ns = epoch_ns
+        self._waiting = deque(event for event in events if event.node == name)
+
+    def step(self, stamp_ns: int, received: Received) -> Outgoing:
+        """What the component gives at a stamp, after the events that are due by then."""
+        if self._waiting:
+            self.apply_due(stamp_ns)
+        component = self.component
+        return (component.cycle if self.is_active else component.idle)(stamp_ns, received)
+
+    def checked(self, outgoing: Outgoing) -> Iterator[tuple[Port, Sample]]:
+        """The messages that may go out, each with its port: those without NaN or infinity."""
+        for key, given in outgoing.items():
+            port = self.ports[key]
+            for sample in given if isinstance(given, tuple) else (given,):
+                bad = port.codec.first_not_finite(port.real_fields, sample)
+                if bad is None:
+                    yield port, sample
+                else:
+                    self.withheld(port.topic, bad)
+
+    def apply_due(self, stamp_ns: int) -> None:
+        """Performs the events that are due at a stamp, each once and in their order."""
+        elapsed_ns = stamp_ns - self._epoch_ns
+        while self._waiting and is_due(self._waiting[0], elapsed_ns):
+            self.perform(self._waiting.popleft())
+
+    def apply(self, event: Event) -> None:
+        """Does what an event says.
+
+        Raises:
+            ParameterError: the value that it sets conflicts with others.
+        """
+        if event.action == "set":
+            self.set_values({event.parameter: event.value})
+        elif event.action == "deactivate":
+            self.deactivate()
+        elif not self.is_active:
+            self.activate()
+
+    def activate(self) -> bool:
+        """Begins to cycle, from a fresh state if it was deactivated before; whether it was."""
+        begins_anew, self._begins_anew = self._begins_anew, False
+        if begins_anew:
+            self.component.configure()
+        self.is_active = True
+        return begins_anew
+
+    def deactivate(self) -> None:
+        """Stops cycling; what the component publishes while idle goes on."""
+        self.is_active = False
+        self._begins_anew = True
+
+    def snapshot(self) -> Any:
+        """All that the coming steps hang on, for `restore`."""
+        return copy.deepcopy(self._memory())
+
+    def restore(self, snapshot: Any) -> None:
+        """Goes back to a snapshot, which may be used again; it may be that of another stepper of the same kind."""
+        state, self.canonical, self.is_active, self._begins_anew, self._waiting = copy.deepcopy(snapshot)
+        # the component stays the one that others know
+        vars(self.component).clear()
+        vars(self.component).update(state)
+        self.tuned()
+
+    def _memory(self) -> tuple:
+        return vars(self.component), self.canonical, self.is_active, self._begins_anew, self._waiting
+
+    def set_values(self, changes: Mapping[str, Any]) -> None:
+        """Changes some parameters, if they agree with the others.
+
+        Raises:
+            ParameterError: they do not; nothing changes.
+        """
+        reason = conflict(type(self.component), {**self.canonical, **changes})
+        if reason is not None:
+            raise ParameterError(reason)
+        self.tune(changes)
+
+    def tune(self, changes: Mapping[str, Any]) -> None:
+        """Gives the component new values, which are known to be sane; its state stays."""
+        self.canonical.update(changes)
+        try:
+            self.component.tune(shaped_values(self.component.table(), self.canonical))
+        except Exception as error:
+            self.failed(error)
+        self.tuned()

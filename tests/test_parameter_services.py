@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every parameter of every node is read by the services that `ros2 param` uses, all of a node in one call."""
+
+from pathlib import Path
+
+import pytest
+from rcl_interfaces.srv import DescribeParameters, GetParameters, GetParameterTypes, ListParameters
+from rclpy.parameter import parameter_value_to_python
+
+from css_common.component import Component
+from css_common.mission import Mission, MissionError, find_component, load_mission
+from css_common.testing import Bench
+
+ROOT = Path(__file__).parents[1]
+MISSIONS = sorted(path.stem for path in (ROOT / "config").glob("*.yaml"))
+
+
+def kinds() -> list[type[Component]]:
+    """Components of all node files."""
+    found = []
+    for file in sorted((ROOT / "src").glob("*/*/nodes/*.py")):
+        if file.stem != "__init__" and file.parents[2].name == file.parents[1].name:
+            try:
+                found.append(find_component(file.parents[1].name, file.stem))
+            except MissionError:  # recorder and player are no components
+                continue
+    return found
+
+
+def read_all(bench: Bench, kind: type[Component], name: str, mission: Mission) -> None:
+    """Reads all parameters of a node in one call of each service and compares them with the mission."""
+    node = bench.host(kind, mission, name, start=False)
+    names = list(bench.request(ListParameters, f"{name}/list_parameters", ListParameters.Request()).result.names)
+    assert {p.name for p in kind.table()} <= set(names)
+    got = bench.request(GetParameters, f"{name}/get_parameters", GetParameters.Request(names=names)).values
+    types = bench.request(
+        GetParameterTypes, f"{name}/get_parameter_types", GetParameterTypes.Request(names=names)
+    ).types
+    described = bench.request(
+        DescribeParameters, f"{name}/describe_parameters", DescribeParameters.Request(names=names)
+    ).descriptors
+    assert len(got) == len(types) == len(described) == len(names)
+    for parameter, value, of_type, descriptor in zip(names, got, types, described, strict=True):
+        assert value.type == of_type == descriptor.type != 0, parameter
+        assert descriptor.name == parameter
+    values = {parameter: parameter_value_to_python(value) for parameter, value in zip(names, got, strict=True)}
+    for parameter, expected in mission.node_of(kind, name).canonical.items():
+        found = values[parameter]
+        assert (list(found) if isinstance(expected, list) else found) == expected, parameter
+    bench.remove(node)
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_nodes_of_a_mission(name):
+    mission = load_mission(name)
+    with Bench() as bench:
+        for node in mission.nodes:
+            read_all(bench, node.component, node.name, mission)
+
+
+def test_kinds_of_nodes_that_no_mission_flies():
+    missions = [load_mission(name) for name in MISSIONS]
+    flown = {node.component for mission in missions for node in mission.nodes}
+    left = [kind for kind in kinds() if kind not in flown]
+    assert len(kinds()) >= 15
+    with Bench() as bench:
+        for kind in left:
+            name = kind.__module__.rpartition(".")[2]
+            read_all(bench, kind, name, next(mission for mission in missions if fits(mission, kind, name)))
+
+
+def fits(mission: Mission, kind: type[Component], name: str) -> bool:
+    """Whether a mission describes what a node needs."""
+    try:
+        return bool(mission.node_of(kind, name))
+    except MissionError:
+        return False
