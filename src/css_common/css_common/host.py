@@ -433,7 +433,8 @@ class ComponentNode(LifecycleNode):
         counters = dict(self.counters)
         for key, edge in self.edges.items():
             counters[f"{key}.accepted"] = edge.accepted
-            counters[f"{key}.repeated"] = edge.repeated
+            if edge.repeated:
+                counters[f"{key}.repeated"] = edge.repeated
             for kind, count in edge.rejected.items():
                 counters[f"{key}{REJECTED}{kind}"] = count
             for kind, count in edge.missing.items():

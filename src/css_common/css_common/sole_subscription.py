@@ -15,6 +15,7 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
+from rclpy._rclpy_pybind11 import InvalidHandle
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
 from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
@@ -142,7 +143,10 @@ class SoleSubscription:
         take = handler.take_data
 
         def take_and_look() -> object:
-            taken = take()
+            try:
+                taken = take()
+            except InvalidHandle:  # the event was under way when the subscription was given up
+                return None
             self._look()
             return taken
 

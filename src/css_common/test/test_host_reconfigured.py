@@ -48,7 +48,7 @@ def change(bench: Bench, name: str, transition: int) -> bool:
 
 def test_messages_that_were_under_way_to_a_node_that_was_cleaned_up_do_no_harm(bench, mission):
     node = bench.host(kind("estimator"), mission(text=TEXT), "estimator")
-    (late,) = [subscription.callback for subscription in node._subscriptions_made]
+    (late,) = [subscription._callback for subscription in node.subscriptions_made]
     data = codec_of(CssVoltages).encode(voltages(0))
     node.trigger_deactivate()
     node.trigger_cleanup()

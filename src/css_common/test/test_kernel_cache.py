@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 import css_common.kernel
+import css_common.places
 
 INNER = "from css_common.kernel import kernel\n@kernel\ndef inner(x):\n    return x + {}\n"
 OUTER = (
@@ -39,7 +40,8 @@ class Project:
         for package in ("css_common", "css_environment", "css_sim", "css_sim/nodes"):
             (root / package).mkdir()
             (root / package / "__init__.py").touch()
-        shutil.copy(css_common.kernel.__file__, root / "css_common")
+        for module in (css_common.kernel, css_common.places):
+            shutil.copy(module.__file__, root / "css_common")
         self.write_inner("1.0")
         (root / "css_sim" / "outer.py").write_text(OUTER)
 
