@@ -45,7 +45,9 @@ def result_object(
 
 def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
     """The JSON object of a flight."""
-    return result_object(
+    criteria = [{**verdict._asdict(), "passed": verdict.passed} for verdict in verdicts(result, runs)]
+    flight = {"domain": result.domain, "failure": result.failure, "incidents": result.notes, "criteria": criteria}
+    common = result_object(
         result.mission,
         runs,
         result.bag,
@@ -54,7 +56,8 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
         cpu_s=result.cpu_s,
         recorded=result.messages_recorded,
         lost=result.messages_lost,
-    ) | {"domain": result.domain, "failure": result.failure, "incidents": result.notes}
+    )
+    return common | flight
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:

@@ -193,4 +193,15 @@ def test_json_result_has_the_documented_keys(tmp_path):
     assert list(json.loads(json.dumps(flight_object(result, [])))) == [
         "mission", "case", "seed", "simulated_s", "wall_s", "cpu_s", "realtime_factor",
         "messages_recorded", "messages_lost", "bag", "runs", "domain", "failure", "incidents",
+        "criteria",
     ]  # fmt: skip
+
+
+def test_json_has_every_criterion_with_value_limit_and_verdict(tmp_path):
+    run = dict.fromkeys(QUANTITIES) | {"estimator": "ekf", "gyro": "on", "flown": True, "heading_error_mean_deg": 1.75}
+    result = FlightResult(load_mission("okeefe_2013"), bag=tmp_path)
+    common = {"estimator": "ekf", "bound": "max"}
+    assert json.loads(json.dumps(flight_object(result, [run])))["criteria"] == [
+        {**common, "quantity": "heading_error_mean_deg", "value": 1.75, "limit": 2.4, "passed": True},
+        {**common, "quantity": "power_positive_s", "value": None, "limit": 180.0, "passed": False},
+    ]

@@ -20,11 +20,11 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
-from css_common.codec import stamp_of
 from css_common.diagnostics import Diagnostics, Health
-from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION, matching_qos
+from css_common.qos import LOOP_PUBLISHER
 from css_recording.bag_reader import BagMessage
 from css_recording.errors import BagError
+from css_recording.lockstep_answers import LockstepAnswers
 from css_recording.merged_bags import Recording
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
 from css_recording.playback_choice import choose
@@ -83,7 +83,7 @@ class PlayerNode(Node):
             raise BagError(str(error)) from error
         self._diagnostics = Diagnostics(self, self.health)
         self._publishers_by_topic: dict[str, Publisher] = {}
-        self._answered: dict[str, int] = {}
+        self._answers = LockstepAnswers(self)
         self._clock_publisher = self.create_publisher(Clock, "/clock", 10) if options.clock else None
         self._executor: Executor | None = None
         self._stopped: Callable[[], bool] = lambda: False
@@ -188,14 +188,7 @@ class PlayerNode(Node):
         publishers = publishers_of_others(self, topic)
         if not publishers:
             return  # stopped
-        self._answered[topic] = -1
-        subscription = self.create_subscription(
-            message_class_of(publishers[0].topic_type),
-            topic,
-            partial(self._note_answer, topic),
-            matching_qos(publishers, LOOP_SUBSCRIPTION.depth),
-            raw=True,
-        )
+        subscription = self._answers.listen_to(topic, publishers)
         self._wait(lambda: subscription.get_publisher_count() > 0, f"{topic} cannot be heard")
 
     def _connected(self) -> bool:
@@ -211,7 +204,7 @@ class PlayerNode(Node):
     # Playing
 
     def _publish_all(self) -> None:
-        self._answered = dict.fromkeys(self._answered, -1)
+        self._answers.forget()
         self.pace.start(self._choice.start_ns)
         looked = self._now()
         for stamp_ns, messages in self._by_stamp():
@@ -222,7 +215,7 @@ class PlayerNode(Node):
                 self._give_way()
             paced = self._publish_group(stamp_ns, messages)
             self.pace.stamp_is_over()
-            if paced and self._answered:
+            if paced and self._answers:
                 self._await_answers(stamp_ns)
 
     def _await_turn(self, stamp_ns: int) -> bool:
@@ -236,7 +229,7 @@ class PlayerNode(Node):
         return False
 
     def _by_stamp(self) -> Iterator[tuple[int, Iterable[BagMessage]]]:
-        played = [*self._publishers_by_topic, *([self._choice.pacing] if self._answered else [])]
+        played = [*self._publishers_by_topic, *([self._choice.pacing] if self._answers else [])]
         choice = self._choice
         messages = self._reader.messages(set(played), choice.start_ns, choice.end_ns)
         return groupby(messages, key=attrgetter("stamp_ns"))
@@ -274,19 +267,11 @@ class PlayerNode(Node):
                 self.destroy_publisher(self._publishers_by_topic.pop(topic))
                 self.report.left_to_live_nodes.append(topic)
 
-    def _note_answer(self, topic: str, data: bytes) -> None:
-        self._answered[topic] = stamp_of(data)
-
     def _await_answers(self, stamp_ns: int) -> None:
-        def complete() -> bool:
-            return all(answered >= stamp_ns for answered in self._answered.values())
-
-        if not complete():
-            self._wait(complete, f"no answer to stamp {stamp_ns} ns", lambda: self._silent(stamp_ns))
-
-    def _silent(self, stamp_ns: int) -> str:
-        silent = [topic for topic, answered in self._answered.items() if answered < stamp_ns]
-        return f" on {', '.join(silent)}"
+        missing = partial(self._answers.missing, stamp_ns)
+        if missing():
+            failure = f"no answer to stamp {stamp_ns} ns"
+            self._wait(lambda: not missing(), failure, lambda: f" on {', '.join(missing())}")
 
     def _wait(self, condition: Callable[[], bool], failure: str, detail: Callable[[], str] = str) -> None:
         limit = time.monotonic() + self._options.patience

@@ -5,7 +5,9 @@ Each file is whole by itself: it has the definitions of all topics known when it
 an index and metadata of its own. `metadata.yaml`, which is written last, tells of all of them.
 """
 
+from bisect import bisect_left
 from collections.abc import Iterable, Mapping, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +26,8 @@ from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 from css_recording.mcap_output import McapOutput
 from css_recording.second_buffer import Message
+
+_STAMP = itemgetter(0)
 
 
 class FileLimits(NamedTuple):
@@ -69,12 +73,26 @@ class SplitBagWriter(BagWriter):
 
     def _store(self, batches: list[list[Message]]) -> None:
         for batch in batches:
-            if self._in_this_file() and self._is_over(batch[0][0]):
-                self._next_file()
-            is_first = not self._in_this_file()
-            self._file_start_ns = batch[0][0] if is_first else min(self._file_start_ns, batch[0][0])
-            self._file_end_ns = batch[-1][0] if is_first else max(self._file_end_ns, batch[-1][0])
-            super()._store([batch])
+            left = batch
+            while left:
+                if self._in_this_file() and self._is_over(left[0][0]):
+                    self._next_file()
+                fitting = self._fitting(left)
+                self._store_in_this_file(left[:fitting])
+                left = left[fitting:]
+
+    def _store_in_this_file(self, batch: list[Message]) -> None:
+        is_first = not self._in_this_file()
+        self._file_start_ns = batch[0][0] if is_first else min(self._file_start_ns, batch[0][0])
+        self._file_end_ns = batch[-1][0] if is_first else max(self._file_end_ns, batch[-1][0])
+        super()._store([batch])
+
+    def _fitting(self, batch: list[Message]) -> int:
+        """How many messages of a sorted batch belong into this file by their time; at least one."""
+        if self._limits.longest_ns is None:
+            return len(batch)
+        start_ns = self._file_start_ns if self._in_this_file() else batch[0][0]
+        return bisect_left(batch, start_ns + self._limits.longest_ns, key=_STAMP)
 
     def _is_over(self, next_ns: int) -> bool:
         most_bytes, longest_ns = self._limits

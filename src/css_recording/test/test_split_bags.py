@@ -8,7 +8,6 @@ import yaml
 from rosbags.rosbag2 import Reader
 
 from css_recording.bag_reader import BagReader
-from css_recording.bag_storage import open_storage
 from css_recording.errors import BagError
 from css_recording.recovery import recover
 from css_recording.split_bag_writer import FileLimits, SplitBagWriter
@@ -85,9 +84,7 @@ def test_each_file_is_whole_by_itself(split, tmp_path):
         shutil.copy(path, alone)
         with BagReader(alone) as reader:
             assert reader.mission_text == "name: test\n"
-        storage = open_storage(alone)
-        own = [values for name, values in storage.metadata() if name == "rosbag2"]
-        storage.close()
+            own = [values for name, values in reader.metadata if name == "rosbag2"]
         assert len(own) == 1
         assert yaml.safe_load(own[0]["serialized_metadata"])["relative_file_paths"] == [path.name]
         assert recover(alone).was_complete
