@@ -45,7 +45,7 @@ def result_object(
 
 def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
     """The JSON object of a flight."""
-    return result_object(
+    figures = result_object(
         result.mission,
         runs,
         result.bag,
@@ -54,7 +54,13 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
         cpu_s=result.cpu_s,
         recorded=result.messages_recorded,
         lost=result.messages_lost,
-    ) | {"domain": result.domain, "failure": result.failure, "incidents": result.notes}
+    )
+    return figures | {
+        "domain": result.domain,
+        "failure": result.failure,
+        "incidents": result.notes,
+        "warnings": result.warnings,
+    }
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:
