@@ -34,6 +34,7 @@ class FlightResult:
         interrupted: the user asked it to end.
         notes: what was not as it should be (restarts, refusals, silence, losses).
         domain: ROS domain that it had for itself; None when nobody chose one.
+        warnings: what the checks before the flight found doubtful.
     """
 
     mission: Mission
@@ -47,6 +48,7 @@ class FlightResult:
     interrupted: bool = False
     notes: list[str] = field(default_factory=list)
     domain: int | None = None
+    warnings: list[str] = field(default_factory=list)
 
     @property
     def realtime_factor(self) -> float:

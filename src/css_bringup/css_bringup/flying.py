@@ -16,6 +16,7 @@ from css_bringup.flight import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
 from css_common import domains, network, places
 from css_common.mission import Mission
+from css_common.preflight import preflight, report
 from css_common.progress_lines import ProgressLines, still_working
 from css_common.stop_signal import StopSignal
 
@@ -53,12 +54,18 @@ def fly(
         processes: one process per node instead of one for all.
         console: where progress is shown, when it is a terminal.
         overwrite: replace a recording that is there.
+
+    Raises:
+        MissionError: a check before the flight refuses the mission; warnings go to standard error and the result.
     """
+    warnings = preflight(mission)
+    report(warnings)
     # noted, not raised: an exception would tear a cycle apart, and a second Ctrl-C the clean-up
     with StopSignal() as stop:
-        if processes:
-            return _fly_processes(mission, bag, console, stop, overwrite)
-        return _fly_composed(mission, bag, console, stop, overwrite)
+        way = _fly_processes if processes else _fly_composed
+        result = way(mission, bag, console, stop, overwrite)
+    result.warnings = warnings
+    return result
 
 
 def _fly_processes(

@@ -44,7 +44,7 @@ def add_domain_option(parser: argparse.ArgumentParser) -> None:
 
 
 def mission_of(arguments: argparse.Namespace) -> Mission:
-    """The mission that the options describe; events after its end are named on standard error.
+    """The mission that the options describe.
 
     Raises:
         MissionError: it is wrong.
@@ -61,10 +61,6 @@ def mission_of(arguments: argparse.Namespace) -> Mission:
             raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
     for remark in mission.remarks:
         complain("warning:", remark)
-    last = (mission.steps - 1) * mission.values.mission.period
-    for event in mission.events:
-        if event.time > last + 1e-9:
-            complain("warning:", f"event {event.name} at {event.time:g} s never comes, the last step is at {last:g} s")
     return mission
 
 

@@ -46,7 +46,6 @@ def result_object(
 def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
     """The JSON object of a flight."""
     criteria = [{**verdict._asdict(), "passed": verdict.passed} for verdict in verdicts(result, runs)]
-    flight = {"domain": result.domain, "failure": result.failure, "incidents": result.notes, "criteria": criteria}
     common = result_object(
         result.mission,
         runs,
@@ -57,7 +56,13 @@ def flight_object(result: FlightResult, runs: Sequence[Run]) -> dict[str, Any]:
         recorded=result.messages_recorded,
         lost=result.messages_lost,
     )
-    return common | flight
+    return common | {
+        "domain": result.domain,
+        "failure": result.failure,
+        "incidents": result.notes,
+        "warnings": result.warnings,
+        "criteria": criteria,
+    }
 
 
 def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) -> None:

@@ -8,13 +8,16 @@ same component without a node, which is why a replayed estimator gives the bytes
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from css_common.codec import Sample
 from css_common.epochs import parse_utc
 from css_common.readings import Readings
 from css_common.schema import Table, Values
 from css_common.sections import SECTIONS
+
+if TYPE_CHECKING:
+    from css_common.mission import Node
 
 BODY = "body"
 INERTIAL = "inertial"
@@ -74,6 +77,25 @@ class Output:
     events: bool = False
 
 
+class Finding(NamedTuple):
+    """What a check before the flight found.
+
+    Attributes:
+        text: key, value, what is wrong and what would be right, in one line.
+        refused: the flight cannot give right numbers; else it is worth a warning.
+    """
+
+    text: str
+    refused: bool = False
+
+
+class Smoothing(NamedTuple):
+    """Share of a new measurement that one cycle of an estimator takes in; 1: all of it."""
+
+    rate: float = 1.0  # of the body rate
+    heading: float = 1.0  # of the direction to the Sun, while no gyro propagates it
+
+
 Received = Mapping[str, Any]
 """Input key to `Sample`; None for an optional input that is silent and for one that is not due."""
 Outgoing = Mapping[str, Sample | tuple[Sample, ...]]
@@ -131,6 +153,24 @@ class Component:
     def conflicts(cls, values: Values) -> Iterable[str]:
         """What is wrong between parameters, one message each."""
         return ()
+
+    @classmethod
+    def preflight(cls, node: "Node", graph: Mapping[str, "Node"]) -> Iterable[Finding]:
+        """What a flight with these values would do that physics or numerics forbid; see `css_common.preflight`.
+
+        Unlike `conflicts`, which make a mission invalid wherever it is read, these keep it from being flown: a
+        recording of such a flight can still be replayed.
+
+        Args:
+            node: this component's node.
+            graph: all nodes of the mission by name.
+        """
+        return ()
+
+    @classmethod
+    def smoothing(cls, values: Values) -> Smoothing:
+        """How an estimator with these values lags behind what it measures, for those who close a loop around it."""
+        return Smoothing()
 
     def configure(self) -> None:
         """Builds algorithm parameters and the initial state from `self.values`."""

@@ -20,6 +20,7 @@ from css_common.mission_file import MissionError
 from css_common.node_arguments import mission_of_arguments, parse_arguments
 from css_common.node_help import describe
 from css_common.plant_host import PlantNode
+from css_common.preflight import preflight, report
 from css_common.rcl_errors import REFUSALS, explained, in_own_words
 from css_common.schema import ParameterError, nearest, shown
 from css_common.stop_signal import StopSignal
@@ -103,6 +104,9 @@ class _Process:
         if self._summary is not None and not self._summary.parent.is_dir():
             raise ParameterError(f"--summary {self._summary}: there is no such folder")
         mission = mission_of_arguments(self._component_type, arguments)
+        # whoever owns time answers for the whole flight, every other node for itself
+        whole = issubclass(self._component_type, Plant)
+        report(preflight(mission, None if whole else self._component_type))
         # Signals are handled here: rclpy would shut its context down with messages still waiting to be answered,
         # and an exception that a signal raises in a callback would pass through the executor's C++ frames.
         with in_own_words():

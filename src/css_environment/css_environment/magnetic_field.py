@@ -7,6 +7,9 @@ import numpy as np
 
 from css_environment.constants import EARTH_ROTATION_RATE
 
+FIRST_YEAR, LAST_YEAR = 1900, 2030
+"""Years at whose beginning the model begins and ends."""
+
 HIGHEST_DEGREE = 13
 """Of the spherical harmonics of IGRF."""
 
@@ -17,7 +20,8 @@ def field_along_orbit(
     """Field in n [T], (T, 3), at positions `r_n` [m], (T, 3).
 
     `dcm_en` is the rotation from n to e at elapsed time zero, from where the Earth turns with `elapsed_s`;
-    `date_ns` (UTC, ns) fixes the secular variation, which is about 100 nT a year: one date does for a day.
+    `date_ns` (UTC, ns) fixes the secular variation, which is about 100 nT a year: one date does for a day. Beyond the
+    years of the model the field is that of its first or last day.
     Harmonics beyond `degree` are left out, as a small flight computer may.
     """
     import ppigrf  # here: it loads pandas, which missions without a magnetometer need not wait for
@@ -34,7 +38,7 @@ def field_along_orbit(
         radius / 1e3,
         np.degrees(colatitude),
         np.degrees(longitude),
-        datetime.fromtimestamp(date_ns / 1e9, tz=UTC).replace(tzinfo=None),
+        _date_in_model(date_ns),
         max_degree=degree,
     )
     up, south, east = np.ravel(up), np.ravel(south), np.ravel(east)
@@ -46,3 +50,8 @@ def field_along_orbit(
     # Back from the turned Earth to its orientation at elapsed time zero, then to n.
     field_e0 = np.stack((cos_a * field_x - sin_a * field_y, sin_a * field_x + cos_a * field_y, field_z), 1)
     return 1e-9 * field_e0 @ np.asarray(dcm_en)
+
+
+def _date_in_model(date_ns: int) -> datetime:
+    date = datetime.fromtimestamp(date_ns / 1e9, tz=UTC).replace(tzinfo=None)
+    return min(max(date, datetime(FIRST_YEAR, 1, 1)), datetime(LAST_YEAR, 1, 1))

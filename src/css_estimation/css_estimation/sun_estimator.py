@@ -7,10 +7,11 @@ from typing import ClassVar
 
 from sensor_msgs.msg import Imu, MagneticField
 
-from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_estimation.eclipse_prediction import EclipsePrediction
+from css_estimation.low_pass import low_pass_gain
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields
 from css_estimation.mode_log import ModeLog
 from css_estimation.sun_heading import PREDICTION_UNKNOWN, Aiding
@@ -51,6 +52,15 @@ class SunEstimator(Component):
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
         return (Output("estimate", f"{name}/sun_estimate", SunEstimate, ends_cycle=True),)
+
+    @classmethod
+    def smoothing(cls, values: Values) -> Smoothing:
+        # in plain Python: loading the compiled one takes a second that a check before the flight need not wait for
+        heading_gain = getattr(cls.algorithm, "heading_gain", None)
+        return Smoothing(
+            rate=low_pass_gain.py_func(values.rate.cutoff, values.mission.period),
+            heading=1.0 if heading_gain is None else heading_gain(values),
+        )
 
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)

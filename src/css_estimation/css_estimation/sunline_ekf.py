@@ -23,6 +23,7 @@ Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 t
 measured rate, 4 propagating without one.
 """
 
+import math
 from typing import NamedTuple
 
 from css_common.kernel import kernel
@@ -141,6 +142,16 @@ def parameters(values: Values) -> EkfParameters:
         propagate_filtered=values.propagate_with == "filtered",
         tracking=sun_tracking.parameters(values),
     )
+
+
+def heading_gain(values: Values) -> float:
+    """Steady gain of the filter across the Sun line at one cell's worth of information in a cycle.
+
+    P = P - P^2 / (P + R) + Q h, solved for the covariance P before an update.
+    """
+    q, r = values.process_sigma**2 * values.mission.period, values.cell_sigma**2
+    before = 0.5 * (q + math.sqrt(q * q + 4.0 * q * r))
+    return before / (before + r)
 
 
 def initial_state(p: EkfParameters) -> EkfState:

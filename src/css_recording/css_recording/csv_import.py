@@ -5,10 +5,9 @@ Topics: `css/voltages`, `gyro/imu` where the table has rates, and `truth` where 
 inside carries the cell layout, the epoch and the period, so that estimators find what they need.
 """
 
-import hashlib
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -36,6 +35,7 @@ IMU = Topic("/gyro/imu", "sensor_msgs/msg/Imu")
 TRUTH = Topic("/truth", "css_msgs/msg/SpacecraftState")
 _SHORTEST_PERIOD_S, _LONGEST_PERIOD_S = 0.001, 60.0
 _LARGEST_GAP_S = 60.0
+_LEAST_PLAUSIBLE, _MOST_PLAUSIBLE = 0.1, 3.0  # largest output of any cell that is in units of full Sun
 _NO_ESTIMATE = -1.0  # first element of a covariance: the quantity is not measured
 
 
@@ -45,25 +45,27 @@ class ImportReport:
 
     Attributes:
         recording: the new recording.
+        telemetry: what was read.
         messages: messages of each topic.
         missing_cells: single cell outputs that were missing; they are NaN in the recording.
         missing_lines: lines without any cell output, which give no message.
         missing_rates: lines without a rate, recorded as a gyro that does not measure.
-        skipped: broken lines left out, by what is wrong with them.
-        ignored_columns: columns that are nothing known.
+        missing_suns: lines without a Sun vector, which give no truth.
         gaps: steps of time longer than one and a half periods.
+        longest_gap_s: the longest step of time.
         period_s: usual step of time.
-        largest_output: of any cell.
+        largest_output: of any cell, after scaling.
     """
 
     recording: Path
+    telemetry: Telemetry
     messages: dict[str, int] = field(default_factory=dict)
     missing_cells: int = 0
     missing_lines: int = 0
     missing_rates: int = 0
-    skipped: Mapping[str, int] = field(default_factory=dict)
-    ignored_columns: tuple[str, ...] = ()
+    missing_suns: int = 0
     gaps: int = 0
+    longest_gap_s: float = 0.0
     period_s: float = 0.0
     largest_output: float = 0.0
 
@@ -81,14 +83,13 @@ def import_telemetry(
         overwrite: replace a recording that is there.
 
     Raises:
-        BagError: the table is no time series of cell outputs, or the recording cannot be written.
+        BagError: the recording cannot be written.
     """
-    report = ImportReport(folder, skipped=telemetry.skipped, ignored_columns=telemetry.ignored_columns)
-    steps = _examine(telemetry.rows, source, report)
+    report = _examined(telemetry, folder)
     topics = [TRUTH] * telemetry.has_sun + [VOLTAGES] + [IMU] * telemetry.has_rate
     metadata = {
-        "mission": mission_text(telemetry, layout, source.stem, report.period_s, max(steps, default=0.0)),
-        "imported_from": json.dumps({"file": source.name, "sha256": hashlib.sha256(source.read_bytes()).hexdigest()}),
+        "mission": mission_text(telemetry, layout, source.stem, report.period_s, report.longest_gap_s),
+        "imported_from": json.dumps({"file": source.name, "sha256": telemetry.sha256}),
         **software_versions(),
     }
     with BagWriter(folder, topics, metadata, overwrite=overwrite) as writer:
@@ -122,19 +123,45 @@ def mission_text(telemetry: Telemetry, layout: CellLayout, name: str, period_s: 
     )
 
 
-def _examine(rows: list[TelemetryRow], source: Path, report: ImportReport) -> list[float]:
-    """Fills in what the table tells about itself; gives the steps of time [s]."""
-    steps = [(b.stamp_ns - a.stamp_ns) * 1e-9 for a, b in pairwise(rows)]
-    report.period_s = round(median(steps), 6) if steps else _LONGEST_PERIOD_S
-    report.gaps = sum(step > 1.5 * report.period_s for step in steps)
-    outputs = [value for row in rows for value in row.cells if not math.isnan(value)]
-    if not outputs:
+def largest_output(telemetry: Telemetry) -> float:
+    """The largest output of any cell; NaN when all are missing."""
+    return max((value for row in telemetry.rows for value in row.cells if not math.isnan(value)), default=math.nan)
+
+
+def refuse_unscaled(telemetry: Telemetry, source: Path) -> None:
+    """Refuses a table without cell outputs, and one that is plainly in another unit while no full scale was stated.
+
+    Raises:
+        BagError: naming the largest output and what would be right.
+    """
+    largest = largest_output(telemetry)
+    if math.isnan(largest):
         raise BagError(f"{source}: every cell output is missing")
-    report.largest_output = max(outputs)
-    report.missing_lines = sum(_is_blind(row) for row in rows)
-    report.missing_cells = sum(math.isnan(value) for row in rows if not _is_blind(row) for value in row.cells)
-    report.missing_rates = sum(row.omega_bn_b is None for row in rows)
-    return steps
+    if not telemetry.scaled and not _LEAST_PLAUSIBLE <= largest <= _MOST_PLAUSIBLE:
+        raise BagError(
+            f"{source}: the largest cell output is {largest:.3g}, expected about 1, which is a cell that the Sun meets "
+            "head-on: say what such a cell reads by --full-scale or by full_scale in the layout, and what it reads in "
+            "the dark by dark_level there; --full-scale 1 takes the outputs as they are"
+        )
+
+
+def _examined(telemetry: Telemetry, folder: Path) -> ImportReport:
+    """What the table tells about itself."""
+    rows = telemetry.rows
+    steps = [(b.stamp_ns - a.stamp_ns) * 1e-9 for a, b in pairwise(rows)]
+    period_s = round(median(steps), 6) if steps else _LONGEST_PERIOD_S
+    return ImportReport(
+        folder,
+        telemetry,
+        missing_cells=sum(math.isnan(value) for row in rows if not _is_blind(row) for value in row.cells),
+        missing_lines=sum(map(_is_blind, rows)),
+        missing_rates=sum(row.omega_bn_b is None for row in rows) if telemetry.has_rate else 0,
+        missing_suns=sum(row.sun_b is None for row in rows) if telemetry.has_sun else 0,
+        gaps=sum(step > 1.5 * period_s for step in steps),
+        longest_gap_s=max(steps, default=0.0),
+        period_s=period_s,
+        largest_output=largest_output(telemetry),
+    )
 
 
 def _is_blind(row: TelemetryRow) -> bool:
@@ -145,7 +172,7 @@ def _messages(row: TelemetryRow, has_rate: bool) -> Iterator[tuple[Topic, bytes]
     rate = np.zeros(3) if row.omega_bn_b is None else np.array(row.omega_bn_b)
     if row.sun_b is not None:
         # The attitude is not known: body and inertial frame are taken for one, so that the Sun direction in the
-        # body is the one of the table. Position and field are not known either and stay zero.
+        # body is the one of the table. Position, velocity and field are not known either: a zero r_n says so.
         codec = codec_of(SpacecraftState)
         truth = codec.sample(row.stamp_ns, INERTIAL_FRAME, sun_n=np.array(row.sun_b), omega_bn_b=rate)
         truth.solar_flux = truth.illumination = 1.0

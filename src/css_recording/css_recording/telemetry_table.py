@@ -1,36 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
 """Reads a table of telemetry: time, cell outputs, body rate, Sun vector.
 
-The first line names the columns. Delimiter: comma, semicolon or tabulator. Lines that begin with # and empty lines
-are skipped. An empty field, `nan`, `na`, `null` or `-` is a missing value.
+The first line names the columns; a unit may stand behind a name in brackets. Separator: comma, semicolon, tabulator,
+bar or blanks; numbers may have decimal commas where commas do not separate. Lines that begin with # and empty lines
+are skipped. An empty field, `nan`, `na`, `null`, `none` or `-` is a missing value, and so is a usual fill value such
+as -9999 or 65535 that lies far outside of everything else.
 
-time                           seconds, or ISO 8601 instants (UTC without an offset)
+time, timestamp                seconds (or --time-unit), or ISO 8601 instants (UTC without an offset), also by day
+                               of year (2024-001T00:00:00)
 <names of the cell layout>     cell outputs
-omega_x_rad_s, omega_y_..      body rate about each axis; also gyro_x or rate_x, and deg_s for degrees
+omega_x_rad_s, omega_y_..      body rate about each axis; also gyro_x or rate_x, and deg_s or dps for degrees
 sun_x, sun_y, sun_z            direction from the spacecraft to the Sun in the body frame, of any length
+
+Lines must go forward in time: of those that do not fit together the largest set that does is good, the others are
+broken.
 """
 
-import csv
+import hashlib
 import math
-import re
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from decimal import Decimal, InvalidOperation
+from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from css_common.epochs import parse_utc
 from css_recording.cell_layout import CellLayout
 from css_recording.errors import BagError
+from css_recording.sentinels import fill_values
+from css_recording.table_columns import TIME_NAMES, Columns, Indices, identify_columns
+from css_recording.table_text import Line, TableText, read_table
+from css_recording.table_times import consistent_lines
+from css_recording.table_values import Broken, parse_number, parse_time
 
 Vector = tuple[float, float, float]
 
-AXES = ("x", "y", "z")
-_TO_RAD = {"rad": 1.0, "deg": math.pi / 180.0}
-_RATE_COLUMN = re.compile(r"(?:omega|gyro|rate)_([xyz])(?:_(?:b|body))?(?:_(rad|deg)_(?:per_)?s)?")
-_MISSING = frozenset(["", "nan", "na", "n/a", "null", "none", "-"])
-_UNIX_ERA = 1e8  # [s] smaller numbers count from another epoch
-_LAST_NS = 2**31 * 10**9  # seconds of a stamp are 32 bits wide
+_NAMES = frozenset([*TIME_NAMES, *(f"sun_{axis}" for axis in "xyz")])
 
 
 class TelemetryRow(NamedTuple):
@@ -42,185 +45,198 @@ class TelemetryRow(NamedTuple):
     sun_b: Vector | None  # unit vector
 
 
+class Refused(NamedTuple):
+    """Broken lines of one kind."""
+
+    lines: int
+    first_line: int
+
+
 class Telemetry(NamedTuple):
     """A table that was read."""
 
     rows: list[TelemetryRow]
     has_rate: bool
     has_sun: bool
-    skipped: Mapping[str, int]  # broken lines by what is wrong with them
+    lines: int  # of telemetry in the table: those used and those refused
+    refused: Mapping[str, Refused]  # broken lines by what is wrong with them
+    fills: Mapping[float, int]  # numbers taken as missing values, and how often
     ignored_columns: tuple[str, ...]
+    read_as: tuple[str, ...]  # what is unusual about the form of the table
+    scaled: bool  # the output of a cell that the Sun meets head-on was stated
+    sha256: str  # of the file
 
 
-class _Broken(Exception):
-    """A broken line: kind of fault for counting, and the whole story."""
+class _Raw(NamedTuple):
+    """Numbers of one line as they stand in it; NaN for missing ones."""
 
-    def __init__(self, kind: str, detail: str) -> None:
-        super().__init__(detail)
-        self.kind = kind
+    line: int
+    stamp_ns: int
+    cells: tuple[float, ...]
+    rate: tuple[float, ...]
+    sun: tuple[float, ...]
 
 
-class _Columns(NamedTuple):
-    time: int
-    cells: tuple[int, ...]
-    rate: tuple[int, int, int] | None
-    rate_factor: float
-    sun: tuple[int, int, int] | None
-    names: tuple[str, ...]
+class _Faults:
+    """Broken lines, counted by kind."""
+
+    def __init__(self) -> None:
+        self.found: list[tuple[int, Broken]] = []
+
+    def add(self, line: int, fault: Broken) -> None:
+        self.found.append((line, fault))
+
+    def counted(self) -> dict[str, Refused]:
+        counts = Counter(fault.kind for _, fault in self.found)
+        return {
+            kind: Refused(count, min(line for line, fault in self.found if fault.kind == kind))
+            for kind, count in counts.items()
+        }
+
+    def first(self) -> tuple[int, Broken]:
+        return min(self.found, key=lambda found: found[0])
 
 
 def read_telemetry(
-    path: Path, layout: CellLayout, epoch_ns: int | None = None, full_scale: float = 1.0, skip_bad: bool = False
+    path: Path,
+    layout: CellLayout,
+    epoch_ns: int | None = None,
+    full_scale: float | None = None,
+    skip_bad: bool = False,
+    time_unit: str | None = None,
 ) -> Telemetry:
     """Reads a table.
 
     Args:
         path: CSV file.
-        layout: names of the cell columns.
-        epoch_ns: [ns since 1970] instant from which seconds count; None: seconds since 1970.
-        full_scale: cell output at normal incidence at 1 AU, by which outputs are divided.
+        layout: names of the cell columns; their dark levels and full scales, if it tells them.
+        epoch_ns: [ns since 1970] instant from which counts of time count; None: 1970.
+        full_scale: what a cell gives above its dark level at normal incidence at 1 AU, by which outputs are divided;
+            None: what the layout says, else 1.
         skip_bad: count broken lines and leave them out.
+        time_unit: s, ms, us or ns; None: what the header says, else s.
 
     Raises:
         BagError: the file cannot be read, a column is missing, or (without `skip_bad`) a line is broken; names
             line, column and what was expected.
     """
-    rows: list[TelemetryRow] = []
-    skipped: Counter[str] = Counter()
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            lines = _fields(file)
-            line, header = next(lines, (1, []))
-            columns, ignored = _identify(path, line, header, layout)
-            last_ns = -1
-            for line, fields in lines:
-                try:
-                    row = _parse(fields, columns, epoch_ns, full_scale, last_ns)
-                except _Broken as error:
-                    if not skip_bad:
-                        raise BagError(f"{path}: line {line}: {error}") from error
-                    skipped[error.kind] += 1
-                    continue
-                last_ns = row.stamp_ns
-                rows.append(row)
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise BagError(f"{path}: cannot be read: {error}") from error
+        content = path.read_bytes()
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from error
+    table = read_table(path, content, _NAMES | set(layout.names))
+    columns = identify_columns(path, table, layout, time_unit)
+    faults = _Faults()
+    raws = list(_numbers(table, columns, epoch_ns, faults))
+    raws, fills = _without_fills(raws)
+    rows = [(raw.line, row) for raw, row in _rows(raws, columns, layout, full_scale, faults)]
+    rows = _in_order(rows, faults)
+    if faults.found and not (skip_bad and rows):
+        raise BagError(_refusal(path, faults, len(table.lines)))
     if not rows:
         raise BagError(f"{path}: no line of telemetry found below the header")
-    return Telemetry(rows, columns.rate is not None, columns.sun is not None, dict(skipped), ignored)
-
-
-def _fields(file: Iterator[str]) -> Iterator[tuple[int, list[str]]]:
-    """Line numbers and fields of all lines that say something."""
-    delimiter = None
-    for number, line in enumerate(file, start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        if delimiter is None:
-            delimiter = max(",;\t", key=line.count)
-        yield number, [field.strip() for field in next(csv.reader([line], delimiter=delimiter))]
-
-
-def _identify(path: Path, line: int, header: list[str], layout: CellLayout) -> tuple[_Columns, tuple[str, ...]]:
-    """Which column is what, and those that are nothing."""
-    where = f"{path}: line {line}"
-    for name in header:
-        if name and header.count(name) > 1:
-            raise BagError(f"{where}: two columns are called {name}")
-    normal_names = [re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_") for name in header]
-    if "time" not in normal_names:
-        raise BagError(f"{where}: no column time; the header is {', '.join(header) or 'empty'}")
-    missing = [name for name in layout.names if name not in header]
-    if missing:
-        raise BagError(f"{where}: no column {missing[0]}, which the cell layout names")
-    rate: dict[str, tuple[int, str]] = {}
-    sun: dict[str, int] = {}
-    for index, name in enumerate(normal_names):
-        if header[index] in layout.names:
-            continue
-        matched = _RATE_COLUMN.fullmatch(name)
-        if matched:
-            axis, unit = matched.groups()
-            if unit is None:
-                raise BagError(f"{where}: column {header[index]}: expected its unit, omega_{axis}_rad_s or _deg_s")
-            rate[axis] = (index, unit)
-        elif name in ("sun_x", "sun_y", "sun_z"):
-            sun[name[-1]] = index
-    for kind, found in (("omega", rate), ("sun", sun)):
-        absent = [axis for axis in AXES if axis not in found]
-        if found and absent:
-            raise BagError(f"{where}: no column {kind}_{absent[0]}; expected all three of x, y, z or none")
-    if len({unit for _, unit in rate.values()}) > 1:
-        raise BagError(f"{where}: the rates of the three axes have different units")
-    columns = _Columns(
-        normal_names.index("time"),
-        tuple(header.index(name) for name in layout.names),
-        (rate["x"][0], rate["y"][0], rate["z"][0]) if rate else None,
-        _TO_RAD[rate["x"][1]] if rate else 1.0,
-        (sun["x"], sun["y"], sun["z"]) if sun else None,
-        tuple(header),
+    return Telemetry(
+        rows=[row for _, row in rows],
+        has_rate=columns.rate is not None,
+        has_sun=columns.sun is not None,
+        lines=len(table.lines),
+        refused=faults.counted(),
+        fills=fills,
+        ignored_columns=columns.ignored,
+        read_as=(*table.read_as, *columns.notes),
+        scaled=full_scale is not None or layout.full_scale is not None,
+        sha256=hashlib.sha256(content).hexdigest(),
     )
-    used = {columns.time, *columns.cells, *(columns.rate or ()), *(columns.sun or ())}
-    return columns, tuple(name for index, name in enumerate(header) if index not in used)
 
 
-def _parse(fields: list[str], columns: _Columns, epoch_ns: int | None, full_scale: float, last_ns: int) -> TelemetryRow:
-    if len(fields) != len(columns.names):
-        raise _Broken("wrong number of fields", f"expected {len(columns.names)} fields, found {len(fields)}")
-    stamp_ns = _stamp(fields[columns.time], columns.names[columns.time], epoch_ns)
-    if stamp_ns <= last_ns:
-        raise _Broken("time does not go forward", f"column time: {fields[columns.time]} is not after the line before")
-    cells = tuple(_number(fields, columns, index) / full_scale for index in columns.cells)
-    omega_bn_b = sun_b = None
-    if columns.rate is not None:
-        omega_bn_b = _vector(fields, columns, columns.rate, columns.rate_factor)
-    if columns.sun is not None:
-        sun_b = _vector(fields, columns, columns.sun, 1.0)
-        if sun_b is not None:
-            length = math.hypot(*sun_b)
-            if length == 0.0 or not math.isfinite(length):
-                raise _Broken("no direction", "columns sun_x, sun_y, sun_z: expected a direction, found no length")
-            sun_b = (sun_b[0] / length, sun_b[1] / length, sun_b[2] / length)
-    return TelemetryRow(stamp_ns, cells, omega_bn_b, sun_b)
+def _refusal(path: Path, faults: _Faults, lines: int) -> str:
+    line, fault = faults.first()
+    broken = len(faults.found)
+    more = f" ({broken} of {lines} lines are broken; --skip-bad leaves them out)" if broken < lines else ""
+    return f"{path}: line {line}: {fault}{more}"
 
 
-def _stamp(text: str, column: str, epoch_ns: int | None) -> int:
-    expected = "expected seconds or an instant such as 2013-06-01T00:00:00Z"
-    try:
-        seconds = Decimal(text)
-    except InvalidOperation:
+def _numbers(table: TableText, columns: Columns, epoch_ns: int | None, faults: _Faults) -> Iterator[_Raw]:
+    for line in table.lines:
         try:
-            stamp_ns = parse_utc(text)
-        except ValueError as error:
-            raise _Broken("no time", f"column {column}: {text!r} found, {expected}") from error
-    else:
-        if not seconds.is_finite() or abs(seconds) > 1e12:
-            raise _Broken("no time", f"column {column}: {text!r} found, {expected}")
-        if epoch_ns is None and seconds < _UNIX_ERA:
-            raise _Broken(
-                "no epoch", f"column {column}: {text} s is not a time since 1970; --epoch names its beginning"
-            )
-        stamp_ns = (epoch_ns or 0) + round(seconds * 1_000_000_000)
-    if not 0 < stamp_ns < _LAST_NS:
-        raise _Broken("no time", f"column {column}: {text} is outside of 1970 to 2038")
-    return stamp_ns
+            yield _parse(line, columns, epoch_ns, table.decimal_comma)
+        except Broken as fault:
+            faults.add(line.number, fault)
 
 
-def _number(fields: list[str], columns: _Columns, index: int) -> float:
-    """A number, NaN when it is missing."""
-    text = fields[index]
-    if text.lower() in _MISSING:
-        return math.nan
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.inf
-    if not math.isfinite(value):
-        raise _Broken("no number", f"column {columns.names[index]}: {text!r} found, expected a number")
-    return value
+def _parse(line: Line, columns: Columns, epoch_ns: int | None, decimal_comma: bool) -> _Raw:
+    if line.fields is None:
+        raise Broken("not readable", "a quotation mark is left open or stands inside a field")
+    fields, names = line.fields, columns.names
+    if len(fields) != len(names):
+        raise Broken("wrong number of fields", f"expected {len(names)} fields, found {len(fields)}")
+
+    def numbers(indices: Indices | tuple[int, ...] | None) -> tuple[float, ...]:
+        return tuple(parse_number(fields[i], names[i], decimal_comma) for i in indices or ())
+
+    stamp_ns = parse_time(fields[columns.time], names[columns.time], epoch_ns, columns.time_unit, decimal_comma)
+    return _Raw(line.number, stamp_ns, numbers(columns.cells), numbers(columns.rate), numbers(columns.sun))
 
 
-def _vector(fields: list[str], columns: _Columns, indices: tuple[int, int, int], factor: float) -> Vector | None:
-    """Three numbers, None when one is missing."""
-    x, y, z = (_number(fields, columns, index) * factor for index in indices)
-    return None if math.isnan(x + y + z) else (x, y, z)
+def _without_fills(raws: list[_Raw]) -> tuple[list[_Raw], Counter[float]]:
+    """The lines with NaN in the place of fill values, and those that were found."""
+    fills = [
+        fill_values(value for raw in raws for value in values(raw))
+        for values in (lambda raw: raw.cells, lambda raw: raw.rate, lambda raw: raw.sun)
+    ]
+    counts = sum(fills, Counter[float]())
+    if counts:
+        cells, rate, sun = fills
+        raws = [
+            raw._replace(cells=_masked(raw.cells, cells), rate=_masked(raw.rate, rate), sun=_masked(raw.sun, sun))
+            for raw in raws
+        ]
+    return raws, counts
+
+
+def _masked(values: tuple[float, ...], fills: Container[float]) -> tuple[float, ...]:
+    return tuple(math.nan if value in fills else value for value in values)
+
+
+def _rows(
+    raws: list[_Raw], columns: Columns, layout: CellLayout, full_scale: float | None, faults: _Faults
+) -> Iterator[tuple[_Raw, TelemetryRow]]:
+    cells = len(layout.names)
+    scales = (full_scale,) * cells if full_scale is not None else layout.full_scale or (1.0,) * cells
+    darks = layout.dark_level or (0.0,) * cells
+    for raw in raws:
+        outputs = tuple((value - dark) / scale for value, dark, scale in zip(raw.cells, darks, scales, strict=True))
+        try:
+            if any(map(math.isinf, outputs)):
+                raise Broken("no number", "a cell output over its full scale is beyond all numbers")
+            yield raw, TelemetryRow(raw.stamp_ns, outputs, _vector(raw.rate, columns.rate_factor), _direction(raw.sun))
+        except Broken as fault:
+            faults.add(raw.line, fault)
+
+
+def _vector(numbers: tuple[float, ...], factor: float = 1.0) -> Vector | None:
+    """Three numbers, None when one is missing or there are none."""
+    if not numbers or math.isnan(sum(numbers)):
+        return None
+    x, y, z = (number * factor for number in numbers)
+    return x, y, z
+
+
+def _direction(numbers: tuple[float, ...]) -> Vector | None:
+    vector = _vector(numbers)
+    if vector is None:
+        return None
+    length = math.hypot(*vector)
+    if length == 0.0 or not math.isfinite(length):
+        raise Broken("no direction", "columns sun_x, sun_y, sun_z: expected a direction, found no length")
+    return _vector(vector, 1.0 / length)
+
+
+def _in_order(rows: list[tuple[int, TelemetryRow]], faults: _Faults) -> list[tuple[int, TelemetryRow]]:
+    """The largest set of lines that go forward in time."""
+    kept = set(consistent_lines([row.stamp_ns for _, row in rows]))
+    for index, (line, _) in enumerate(rows):
+        if index not in kept:
+            others = f"the {len(kept)} lines that do" if len(kept) > 1 else "the other"
+            faults.add(line, Broken("time does not go forward", f"column time: it does not go forward with {others}"))
+    return [row for index, row in enumerate(rows) if index in kept]

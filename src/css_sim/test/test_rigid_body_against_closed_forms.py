@@ -11,7 +11,15 @@ from numpy.linalg import norm
 from scipy.integrate import solve_ivp
 
 from css_common.attitude import mrp_to_dcm
-from css_sim.rigid_body import RotationState, propagate, rigid_body, wheel_momentum_at_speed, wheel_speed
+from css_sim.rigid_body import (
+    MOST_STEPS,
+    RotationState,
+    integration_steps,
+    propagate,
+    rigid_body,
+    wheel_momentum_at_speed,
+    wheel_speed,
+)
 
 R = math.sqrt(0.5)
 INERTIA = np.diag([10.5, 8.0, 6.75])
@@ -226,3 +234,43 @@ def test_invariants_hold_for_any_start_and_command(sigma, omega, speeds, command
             # cutting one wheel after another moves the first again by the ratio of wheel to body inertia
             slack = 0.1 * 2 * 0.030 / 6.75
             assert limits[i] - slack <= abs(speed[i])
+
+
+@pytest.mark.parametrize(("dt", "steps"), [(0.1, 1000), (1.0, 100), (60.0, 2)])
+def test_a_fast_tumble_keeps_momentum_and_energy_at_any_period(dt, steps):
+    # 99.7 deg/s lost a quarter of its rate in 100 s at a period of 1 s, and made thousands of it at 60 s
+    start = RotationState((0.1, -0.2, 0.3), tuple(np.radians([60.0, -55.0, 57.0])))
+    momentum = np.zeros(0)
+    end = fly(FREE_BODY, start, momentum, np.zeros(0), ZERO, dt, steps)
+    h_start, e_start = momentum_n(FREE_BODY, start, momentum), kinetic_energy(FREE_BODY, start, momentum)
+    np.testing.assert_allclose(momentum_n(FREE_BODY, end, momentum), h_start, atol=1e-4 * norm(h_start))
+    assert kinetic_energy(FREE_BODY, end, momentum) == pytest.approx(e_start, rel=1e-4)
+
+
+def test_motion_at_long_periods_is_that_of_an_independent_integrator():
+    start = RotationState((0.0, 0.1, 0.0), (0.4, -0.3, 0.5))
+    momentum = np.array([0.3, -0.2, 0.1, 0.4])
+    command, torque = np.array([0.01, -0.02, 0.005, 0.0]), (1e-3, -2e-3, 5e-4)
+    sigma, omega, wheels = exact_motion(PLANT, start, momentum.copy(), command, torque, 5.0)
+    end = fly(PLANT, start, momentum, command, torque, 5.0, 1)
+    np.testing.assert_allclose(end.omega_bn_b, omega, atol=1e-5)
+    np.testing.assert_allclose(momentum, wheels, atol=1e-12)
+    np.testing.assert_allclose(mrp_to_dcm(end.sigma_bn), mrp_to_dcm(tuple(sigma)), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("omega", "h_b", "torque", "dt", "steps"),
+    [
+        ((0.0, 0.0, 0.0), ZERO, ZERO, 60.0, 1),
+        ((1.0, 0.0, 0.0), ZERO, ZERO, 0.149, 1),
+        ((-1.0, 0.0, 0.0), ZERO, ZERO, 0.151, 2),
+        ((0.0, 0.0, 0.0), (10.5, 0.0, 0.0), ZERO, 1.5, 10),
+        ((0.0, 0.0, 0.0), ZERO, (0.0, 0.0, 6.75), 3.0, 60),
+        ((1e9, 0.0, 0.0), ZERO, ZERO, 60.0, MOST_STEPS),
+        ((math.nan, 0.0, 0.0), ZERO, ZERO, 60.0, MOST_STEPS),
+        ((math.inf, 0.0, 0.0), ZERO, ZERO, 60.0, MOST_STEPS),
+    ],
+)
+def test_steps_keep_the_angle_of_each_small(omega, h_b, torque, dt, steps):
+    assert integration_steps(FREE_BODY, omega, h_b, torque, dt) == steps
+    assert integration_steps(FREE_BODY._replace(substeps=7), omega, h_b, torque, dt) == max(7, steps)

@@ -13,6 +13,7 @@ import numpy as np
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
 from css_common.mission import Mission, MissionError, Node
+from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
 from css_common.stepping import Stepper
 from css_studies.flight_log import LOGGED_TYPES, FlightLog
@@ -77,6 +78,7 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
 
 
 def _fly(mission: Mission, wires: "Wires") -> None:
+    report(preflight(mission))
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
     plant.stepper.apply_due(stamp_ns)

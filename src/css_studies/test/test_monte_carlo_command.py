@@ -25,6 +25,7 @@ def test_json_on_the_last_line(tmp_path, capsys):
         "cpu_ns_per_case_step",
         "configurations",
         "out",
+        "warnings",
     ]
     assert (result["mission"], result["cases"], result["steps"], result["out"]) == ("okeefe_2013", 3, 30, str(folder))
     flown = [(row["estimator"], row["gyro"], *row["overrides"]) for row in result["configurations"]]

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated coarse sun sensors."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
 from css_common.attitude import mrp_to_dcm
-from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
@@ -19,6 +20,7 @@ from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, sun_cells
+from css_sim.sensor_checks import LOUDEST_CELL, noise_findings
 
 
 class CssArray(Component):
@@ -54,6 +56,10 @@ class CssArray(Component):
             yield f"output_low: {values.output_low:g} given, expected at least cells.smallest_reading"
         if values.output_high > values.cells.largest_reading:
             yield f"output_high: {values.output_high:g} given, expected at most cells.largest_reading"
+
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return noise_findings("noise", node.values.noise, LOUDEST_CELL, "")
 
     def configure(self) -> None:
         values = self.values

@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated spacecraft, the owner of simulated time."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 
 from css_common.attitude import mrp_to_quaternion
-from css_common.component import INERTIAL, Input, Outgoing, Output, Plant, Received
+from css_common.component import INERTIAL, Finding, Input, Outgoing, Output, Plant, Received
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
 from css_sim import disturbances, flight_environment, initial_conditions
+from css_sim.flight_checks import check_rate, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
 
@@ -26,7 +28,9 @@ class Dynamics(Plant):
         *initial_conditions.PARAMETERS,
         *flight_environment.PARAMETERS,
         *disturbances.PARAMETERS,
-        integer("substeps", 1, "-", "integration steps per control cycle", low=1, high=1000),
+        integer(
+            "substeps", 1, "-", "least integration steps per control cycle; fast motion has more", low=1, high=1000
+        ),
         flag("publish_pose", False, "also publish the body's pose, for displays"),
     )
 
@@ -65,6 +69,10 @@ class Dynamics(Plant):
         yield from disturbances.conflicts(values)
         yield from initial_conditions.conflicts(values)
 
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return plant_findings(node, graph)
+
     def configure(self) -> None:
         values = self.values
         key = random_key(values.mission.seed, values.mission.case)
@@ -96,6 +104,7 @@ class Dynamics(Plant):
             self.period_ns * 1e-9,
             self._torque,
         )
+        check_rate(self._state.omega_bn_b)
         stamp_ns += self.period_ns
         self.finished = self.step_of(stamp_ns) >= self._steps
         return self._messages(stamp_ns, torque_limited, speed_limited)

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated rate gyro."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 from sensor_msgs.msg import Imu
 
-from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
 from css_msgs.msg import SpacecraftState
 from css_sim import gyro
+from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 _ZERO = np.zeros(3)
@@ -30,6 +34,10 @@ class Gyro(Component):
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
         return (Output("imu", "gyro/imu", Imu),)
+
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return noise_findings("noise_deg_s", node.values.noise_deg_s, LOUDEST_GYRO_DEG_S, "deg/s")
 
     def configure(self) -> None:
         self._key = random_key(self.values.mission.seed, self.values.mission.case)

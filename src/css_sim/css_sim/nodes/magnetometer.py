@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated magnetometer."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 from sensor_msgs.msg import MagneticField
 
 from css_common.attitude import mrp_to_dcm
-from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
+from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.vectors import multiply
 from css_msgs.msg import SpacecraftState
 from css_sim import magnetometer
+from css_sim.sensor_checks import LOUDEST_FIELD_NT, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 
@@ -32,6 +36,10 @@ class Magnetometer(Component):
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
         return (Output("field", "mag/field", MagneticField, divider=values.magnetometer.divider),)
+
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return noise_findings("noise_nt", node.values.noise_nt, LOUDEST_FIELD_NT, "nT")
 
     def configure(self) -> None:
         self._key = random_key(self.values.mission.seed, self.values.mission.case)
@@ -57,9 +65,7 @@ class Magnetometer(Component):
         return step % self.values.magnetometer.divider == 0
 
     def _field(self, stamp_ns: int, field_b: np.ndarray, covariance: np.ndarray) -> Outgoing:
-        return {
-            "field": self.message("field", stamp_ns, magnetic_field=field_b, magnetic_field_covariance=covariance)
-        }
+        return {"field": self.message("field", stamp_ns, magnetic_field=field_b, magnetic_field_covariance=covariance)}
 
 
 main = node_main(Magnetometer)

@@ -1,14 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Simulated spinning payload of a sounding rocket, the owner of simulated time."""
 
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 
 from css_common.attitude import dcm_to_mrp
-from css_common.component import INERTIAL, Outgoing, Output, Plant, Received
+from css_common.component import INERTIAL, Finding, Outgoing, Output, Plant, Received
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
+from css_environment.orbit_checks import field_findings, orbit_findings
 from css_msgs.msg import SpacecraftState
 from css_sim import flight_environment
 from css_sim.spinning_payload import payload_motion, payload_state
@@ -23,6 +27,12 @@ class Rocket(Plant):
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
         return (Output("truth", "truth", SpacecraftState, frame=INERTIAL),)
+
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        yield from orbit_findings(node.values)
+        if node.values.geomagnetic_field:
+            yield from field_findings(node.values)
 
     def configure(self) -> None:
         values = self.values

@@ -14,6 +14,7 @@ from rich.text import Text
 from css_common import places
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission_file import MissionError
+from css_common.preflight import reported
 from css_studies.monte_carlo import StudyError
 from css_studies.monte_carlo.progress import progress_bar
 from css_studies.monte_carlo.study import Progress
@@ -67,7 +68,8 @@ def _run(options: argparse.Namespace) -> int:
     _print_table(paper, rows, console)
     console.print(f"page: {folder / 'index.html'}", soft_wrap=True)
     if options.json:
-        print(json.dumps({"paper": paper.name, "rows": [row_object(row) for row in rows]}, allow_nan=False))
+        page = {"paper": paper.name, "rows": [row_object(row) for row in rows], "warnings": reported()}
+        print(json.dumps(page, allow_nan=False))
     return 0
 
 

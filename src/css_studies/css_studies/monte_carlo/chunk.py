@@ -2,6 +2,7 @@
 """A few cases of one configuration flown from start to end: the unit of work, of resuming and of distribution."""
 
 import time
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -9,9 +10,11 @@ import numba.typed
 import numpy as np
 
 from css_common.mission import mission_from_text
+from css_sim.flight_checks import MotionError, check_rate
 from css_studies.monte_carlo.case_figures import Tallies, new_tallies
 from css_studies.monte_carlo.loop import fly_block, trace_columns
 from css_studies.monte_carlo.mission_flight import MissionFlight
+from css_studies.monte_carlo.study_folder import StudyError
 from css_studies.monte_carlo.surroundings import BLOCK_STEPS
 
 
@@ -66,4 +69,14 @@ def fly_cases(flight: MissionFlight, numbers: np.ndarray, sample_every: int, tra
             start = time.thread_time()
             fly_block(stretch.vehicle, stretch.cases, states, around, flight.marks[rows], begin, tallies, block_trace)
             cpu_s += time.thread_time() - start
+            _check_motion(flight, numbers, states, begin)
     return Flown(tallies, trace, cpu_s)
+
+
+def _check_motion(flight: MissionFlight, numbers: np.ndarray, states: Iterable, step: int) -> None:
+    for number, state in zip(numbers, states, strict=True):
+        try:
+            check_rate(state.rotation.omega_bn_b)
+        except MotionError as error:
+            after = step * flight.mission.period_ns * 1e-9
+            raise StudyError(f"case {number} of {flight.mission.name}, after {after:g} s: {error}") from error

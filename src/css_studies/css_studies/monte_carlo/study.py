@@ -2,7 +2,7 @@
 """Studies: many cases of a mission in several configurations, resumable, with the same bytes however they are run."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +12,7 @@ import pyarrow as pa
 
 from css_common.kernel import kernel_source_hash
 from css_common.mission import Mission
+from css_common.preflight import preflight, report
 from css_studies.direct_flight import configured
 from css_studies.monte_carlo.case_figures import SAMPLED
 from css_studies.monte_carlo.case_table import FIGURES
@@ -60,6 +61,7 @@ class Study:
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
+        warnings: what the checks before the flights found doubtful, in this run.
     """
 
     folder: Path
@@ -68,6 +70,7 @@ class Study:
     percentiles: pa.Table
     cpu_s: float = 0.0
     flown: int = 0
+    warnings: tuple[str, ...] = ()
 
 
 def read_study(folder: str | Path) -> Study:
@@ -102,17 +105,20 @@ def run_study(
         scheduler: where chunks run; None: threads of this process.
 
     Raises:
-        MissionError: a configuration does not fit the mission, or the mission has no place in the loop.
+        MissionError: a configuration does not fit the mission, a check before the flight refuses it, or it has no
+            place in the loop.
         StudyError: the folder cannot be used.
     """
     configurations = tuple(configurations)
     missions = [configuration.applied(mission) for configuration in configurations]
+    warnings = tuple(dict.fromkeys(line for flown in missions for line in preflight(flown)))
+    report(warnings)
     sample_every = max(1, round(sample_s / (mission.period_ns * 1e-9)))
     store = StudyFolder(Path(folder))
     manifest = _manifest(mission, configurations, cases, first_case, sample_every)
     store.prepare(manifest)
     if store.complete:
-        return read_study(folder)
+        return replace(read_study(folder), warnings=warnings)
     ranges = [
         (first, min(CHUNK_CASES, first_case + cases - first))
         for first in range(first_case, first_case + cases, CHUNK_CASES)
@@ -141,7 +147,7 @@ def run_study(
         _merged_cases(store, configurations, names),
         _merged_percentiles(store, configurations, names, sample_every * mission.period_ns * 1e-9),
     )
-    return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps)
+    return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
 
 
 def _chunk_name(configuration: int, first: int, count: int) -> str:

@@ -34,6 +34,7 @@ def study_object(study: Study, wall_s: float, cpu_s: float) -> dict[str, Any]:
         "cpu_ns_per_case_step": 1e9 * study.cpu_s / study.flown if study.flown else None,
         "configurations": configuration_objects(study),
         "out": str(study.folder),
+        "warnings": list(study.warnings),
     }
 
 

@@ -1,18 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sun-pointing control of the spacecraft with wheels and, if fitted, torque rods."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 from sensor_msgs.msg import MagneticField
 
-from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.component import Component, Finding, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.vectors import vector_of
 from css_msgs.msg import ControlStatus, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand
 from sunpoint_control import sun_pointing_control as control
+from sunpoint_control.control_checks import control_findings
 from sunpoint_control.modes import MODE_SAFE, REASON_COMMANDED
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -67,6 +69,10 @@ class MrpControl(Component):
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         return control.conflicts(values)
+
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return control_findings(node, graph)
 
     def configure(self) -> None:
         self._parameters = control.parameters(self.values)

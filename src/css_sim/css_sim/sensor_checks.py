@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of simulated sensors before a flight: errors in which the measurement drowns."""
+
+from collections.abc import Iterator
+
+from css_common.component import Finding
+
+LOUDEST_CELL = 0.3
+"""1 sigma of a cell's output: the level below which estimators take no cell for one that sees the Sun."""
+
+LOUDEST_GYRO_DEG_S = 5.0
+"""1 sigma of a body rate [deg/s]: the rate at which a control goes over from damping to pointing."""
+
+LOUDEST_FIELD_NT = 20_000.0
+"""1 sigma of a field component [nT]: the weakest field that a low orbit meets."""
+
+
+def noise_findings(key: str, sigma: float, loudest: float, unit: str) -> Iterator[Finding]:
+    """A warning for noise in which nothing can be seen."""
+    if sigma > loudest:
+        yield Finding(
+            f"{key}: {sigma:g} given, expected at most {loudest:g} {unit}".rstrip() + ": the measurement drowns in it"
+        )

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Checks of the control before a flight: gains that cannot be stable, wheels that cannot turn the body."""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from css_common.component import Finding, Plant, Smoothing
+from css_common.mission import Node
+from css_common.schema import Values
+from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
+from sunpoint_control.wheel_allocation import pseudo_inverse
+
+
+def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
+    """What the gains and wheels of a control node do in a mission's graph."""
+    values = node.values
+    model = loop_model(values, graph)
+    if values.wheels.max_torque == 0.0:
+        yield Finding("wheels.max_torque: 0 given, expected a torque above 0: the wheels cannot turn the body")
+    turned = np.linalg.matrix_rank(model.authority, tol=1e-6)
+    if turned < 3:
+        yield Finding(f"wheels_out: the wheels that are left turn the body about {turned} of 3 axes, expected all")
+    gains = Gains(values.gains.k, values.gains.p, values.gains.ki)
+    yield from gain_findings(model, gains, _setting(values, model))
+
+
+def loop_model(values: Values, graph: Mapping[str, Node]) -> LoopModel:
+    """The loop around a control with these values, as the graph closes it."""
+    estimator = graph.get(values.graph.estimator)
+    use_gyro = bool(estimator is None or getattr(estimator.values, "use_gyro", True))
+    measured = not graph or any(output.topic == "gyro/imu" for other in graph.values() for output in other.outputs)
+    simulated = any(issubclass(other.component, Plant) for other in graph.values())
+    axes = np.asarray(values.wheels.axes)
+    return LoopModel(
+        inertia=np.asarray(values.spacecraft.inertia),
+        array_normal_b=np.asarray(values.spacecraft.array_normal),
+        authority=axes.T @ pseudo_inverse(axes, values.wheels_out),
+        period=values.mission.period,
+        smoothing=estimator.component.smoothing(estimator.values) if estimator else Smoothing(),
+        gyro=use_gyro and (measured or not simulated),
+        late=not simulated or values.io.input_matching != "exact",
+    )
+
+
+def _setting(values: Values, model: LoopModel) -> str:
+    """What else the limits hang on."""
+    gains = values.gains
+    source = "gyro" if model.gyro else "no gyro"
+    return (
+        f"with k {gains.k:g}, p {gains.p:g}, ki {gains.ki:g}, spacecraft.inertia, mission.period {model.period:g} s, "
+        f"{source} and the smoothing of {values.graph.estimator}"
+    )
