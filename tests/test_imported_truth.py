@@ -44,7 +44,8 @@ def test_the_orbit_of_the_defaults_is_named_where_it_is_used(bag, capsys):
     ekf, flat = result["replayed"]
     assert ekf["notes"] == []
     (note,) = flat["notes"]
-    assert note.startswith("orbit: ") and note.endswith("gives none, that of the defaults is used")
+    assert note.startswith("orbit: ") and "gives none, that of the defaults is used" in note
+    assert "flat:eclipse.source=sensors does without" in note
     assert note in screen
     result, _ = replay(bag.rename(bag.with_name("again")), capsys, "flat:eclipse.source=sensors")
     assert result["replayed"][0]["notes"] == []

@@ -148,7 +148,8 @@ def replayed(
     changed = ",".join(f"{key}={value}" for key, value in request.changes.items() if key != "use_gyro")
     run = Replayed(request.label, changed, node, flown, mission.epoch_ns)
     if uses_orbit(node) and not any(key.startswith("orbit.") for key in node_keys(mission, node.name)):
-        run.notes.append(f"orbit: {mission.origin} gives none, that of the defaults is used")
+        remedy = f" ({request.label}:eclipse.source=sensors does without)" if hasattr(node.values, "eclipse") else ""
+        run.notes.append(f"orbit: {mission.origin} gives none, that of the defaults is used{remedy}")
     if base is None:
         return run
     pinned = {*request.changes, *(key.removeprefix(f"{base.name}.") for key in overridden)}
