@@ -46,7 +46,6 @@ INCIDENTS = "incidents"
 _MEANING = {
     "repeated": "with the stamp of the one before",
     "back": "with a stamp earlier than the one before",
-    "late": "too late for their place in the recording, kept out of order",
 }
 _LOOK_EVERY = 0.02
 _DISCOVER_EVERY = 0.2
