@@ -7,7 +7,6 @@ import pytest
 import yaml
 from rosbags.rosbag2 import Reader
 
-from css_recording.bag_files import open_storage
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
 from css_recording.recovery import recover
