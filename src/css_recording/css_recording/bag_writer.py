@@ -154,6 +154,7 @@ class BagWriter:
         batches = self._buffer.add((stamp_ns, index, data, publish_time_ns))
         if batches:
             self._store(batches)
+            self._check_place()
 
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Store a named set of texts at once, between the messages: an event, a parameter that changed."""
@@ -175,6 +176,7 @@ class BagWriter:
         """Hand everything received so far to the operating system."""
         self._check_open()
         self._store(self._buffer.drain())
+        self._check_place()
 
     def close(self, notes: Mapping[str, str] | None = None) -> None:
         """Finish the recording. Closing it again does nothing.
@@ -184,7 +186,6 @@ class BagWriter:
         if not self._open:
             return
         self.flush()
-        self._check_place()
         if notes:
             self.add_metadata(FLIGHT_RECORD, notes)
         self._finish()
@@ -221,8 +222,6 @@ class BagWriter:
             self._end_ns = max(self._end_ns, batch[-1][0])
             with self._disk():
                 self._output.write_chunk(self._numbered(batch))
-        if batches:
-            self._check_place()
 
     def _check_place(self) -> None:
         """End the recording when its file is no longer where it was begun, and save what it holds."""
@@ -237,8 +236,11 @@ class BagWriter:
             prepare_folder(self.folder, overwrite=False)
         self.path = place or self.folder / self.path.name
         self.folder = self.path.parent
+        received = sum(self._counts)
         self._finish(copy=None if place else self.path)
-        self._failure = f"{what}; the {sum(self._counts)} messages until then are in {self.folder}"
+        kept = sum(self._counts)
+        which = f"the {kept}" if kept == received else f"the last {kept} of {received}"
+        self._failure = f"{what}; {which} messages until then are in {self.folder}"
         raise BagError(self._failure)
 
     def _numbered(self, batch: list[Message]) -> Iterator[tuple[int, int, int, int, bytes]]:

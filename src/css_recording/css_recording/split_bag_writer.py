@@ -11,7 +11,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from css_recording.bag_folder import write_atomically
+from css_recording.bag_folder import is_in_place, write_atomically
 from css_recording.bag_metadata import (
     METADATA_FILE,
     BagSummary,
@@ -89,12 +89,14 @@ class SplitBagWriter(BagWriter):
 
     def _fitting(self, batch: list[Message]) -> int:
         """How many messages of a sorted batch belong into this file by their time; at least one."""
-        if self._limits.longest_ns is None:
+        if self._limits.longest_ns is None or not is_in_place(self._output.descriptor, self.path):
             return len(batch)
         start_ns = self._file_start_ns if self._in_this_file() else batch[0][0]
         return bisect_left(batch, start_ns + self._limits.longest_ns, key=_STAMP)
 
     def _is_over(self, next_ns: int) -> bool:
+        if not is_in_place(self._output.descriptor, self.path):
+            return False  # what is written is saved when the batches are stored
         most_bytes, longest_ns = self._limits
         if longest_ns is not None and next_ns - self._file_start_ns >= longest_ns:
             return True
@@ -128,6 +130,10 @@ class SplitBagWriter(BagWriter):
         self._finished.append(file)
 
     def _finish(self, copy: Path | None = None) -> None:
+        if copy is not None:  # the folder was deleted, and with it the files that were finished
+            self._counts = self._in_this_file_by_topic()
+            self._start_ns, self._end_ns = self._file_start_ns, self._file_end_ns
+            self._finished.clear()
         if not self._finished:
             super()._finish(copy)
             return

@@ -135,3 +135,20 @@ def test_a_full_disk_between_two_files_ends_the_recording_with_what_it_has(fligh
                 writer.write(*message)
         assert writer.closed
     assert messages(tmp_path / "bag" / "bag_0.mcap") == flight.messages(10)
+
+
+def test_of_a_folder_that_is_deleted_the_file_being_written_is_saved(flight, tmp_path):
+    folder, saved = tmp_path / "bag", tmp_path / "bag_rescued"
+    writer = SplitBagWriter(folder, flight.topics, {"mission": "m: 1"}, files=FileLimits(longest_ns=2 * 10**9))
+    written = flight.messages(50)
+    for message in written:
+        writer.write(*message)
+    shutil.rmtree(folder)
+    with pytest.raises(BagError, match=rf"was deleted .*; the last 90 of 150 messages until then are in {saved}"):
+        writer.close()
+    kept = messages(saved)
+    assert kept == written[-len(kept) :]
+    assert len(kept) == 90  # of the file that began at 2 s
+    with BagReader(saved) as reader:
+        assert reader.notes == []
+        assert reader.mission_text == "m: 1"

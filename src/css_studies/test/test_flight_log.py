@@ -207,3 +207,15 @@ def test_stamps_of_other_clocks_belong_to_the_nearest_step(tmp_path):
     np.testing.assert_array_equal(rows, steps)
     shifted.stamp_ns = shifted.stamp_ns + 10**12
     assert len(log.truth_rows(shifted)[0]) == 0
+
+
+def test_a_damaged_message_costs_itself_alone_and_is_noted(tmp_path):
+    codec = codec_of(SunEstimate)
+    written = [codec.encode(codec.sample(EPOCH_NS + i, "bus", nis=float(i))) for i in range(5)]
+    with BagWriter(tmp_path / "bag", [Topic("/ekf/sun_estimate", "css_msgs/msg/SunEstimate")]) as writer:
+        for i, data in enumerate(written):
+            writer.write("/ekf/sun_estimate", EPOCH_NS + i, {1: data[:-9], 3: b"\0\0" + data[2:]}.get(i, data))
+    log = read_flight(tmp_path / "bag")
+    np.testing.assert_array_equal(log.estimates["ekf"].nis, [0.0, 2.0, 4.0])
+    assert any("1 of 4 messages left out" in note for note in log.notes)
+    assert any("/ekf/sun_estimate: 1 message at" in note and "big-endian" in note for note in log.notes)
