@@ -10,7 +10,7 @@ import pytest
 from flights import short_mission
 
 from css_bringup.commands import fly
-from css_bringup.options import USAGE
+from css_common.command import USAGE
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_common.node_process import run_node
