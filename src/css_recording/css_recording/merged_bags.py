@@ -93,6 +93,13 @@ class MergedBags:
                 streams.append(reader.messages(wanted, start_ns, end_ns))
         return streams[0] if len(streams) == 1 else heapq.merge(*streams, key=attrgetter("stamp_ns"))
 
+    @property
+    def notes(self) -> list[str]:
+        """What must be known of the recordings, and what was passed over in them so far, one text each."""
+        return [
+            f"{reader.path}: {note}" for reader in self._readers for note in (*reader.notes, *map(str, reader.refused))
+        ]
+
     def close(self) -> None:
         """Releases the files."""
         for reader in self._readers:

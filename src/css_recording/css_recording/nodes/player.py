@@ -65,9 +65,12 @@ def _run(parser: CommandParser, options: argparse.Namespace, for_ros: Sequence[s
         _name_unused_overrides(parser, playback, recording)
         with ros_process("player", for_ros):
             report = _play(recording, playback, stop)
+        notes = recording.notes
     print(_summary(report))
+    for note in notes:
+        complain(parser.prog, note, "note")
     if options.json:
-        print(json.dumps(asdict(report)))
+        print(json.dumps(asdict(report) | {"notes": notes}))
     return 0
 
 
