@@ -24,6 +24,7 @@ _OF_THE_PLANT = {
     "partners_lost": "{} partners silent beyond the limit; the flight went on without them",
     "malformed_answers": "{} answers that are no message",
 }
+_READINGS = (".missing", ".impossible")
 
 
 def node_incidents(mission: Mission, counters: Mapping[str, Counters]) -> list[str]:
@@ -49,6 +50,8 @@ def _at_the_edge(name: str, counted: Counters) -> Iterator[str]:
         source, rejected, kind = key.partition(REJECTED)
         if rejected:
             yield f"{name}: {count} messages of {source} refused ({kind})"
+        if key.endswith(_READINGS):
+            yield f"{name}: {count} readings counted as missing ({key})"
         topic, stranger, node = key.partition(STRANGER)
         if stranger:
             yield f"{name}: {count} messages of {node} on {topic} left out, which another node writes"
