@@ -178,7 +178,7 @@ def integration_steps(p: RigidBody, omega_bn_b: Vec3, h_b: Vec3, torque_b: Vec3,
         torque_b: on the body [N m]; it may speed the body up within `dt`.
     """
     i = p.inertia_inverse
-    # a bound without roots, which nearly every cycle of nearly every flight stays below: no norm is above a sum of sizes
+    # a bound without roots, below which nearly every cycle stays: no norm is above a sum of sizes
     rate = _size(omega_bn_b) + (i[0][0] + i[1][1] + i[2][2]) * (_size(h_b) + dt * _size(torque_b))
     if rate * dt <= LARGEST_ANGLE:
         return p.substeps

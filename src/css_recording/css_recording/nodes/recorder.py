@@ -43,7 +43,7 @@ _EXAMPLES = (
 )
 _EXITS = {
     0: "the recording is complete",
-    1: "it could not be written to its end, or a topic named with --topic never appeared",
+    1: "it could not be written to its end, lacks messages, or a topic named with --topic never appeared",
     2: "an option or the mission is wrong, or the folder cannot be taken",
 }
 
@@ -79,7 +79,7 @@ def _run(parser: CommandParser, options: argparse.Namespace, for_ros: Sequence[s
             choice=choice,
         )
         missing = _record(parser, options, node, folder, stop)
-    return FAILED if node.failure or missing else 0
+    return FAILED if node.failure or missing or node.faults() else 0
 
 
 def _choice(options: argparse.Namespace) -> RecordingChoice:
@@ -124,7 +124,7 @@ def _notes(file: str | None, node: RecorderNode) -> dict[str, str]:
     """What the flight was like, as its supervisor left it, and what the recorder itself lacks."""
     lines = node.faults()
     if file is not None:
-        with suppress(OSError):  # a supervisor that died leaves none
+        with suppress(OSError, ValueError):  # a supervisor that died leaves none, or half of one
             lines = [*json.loads(Path(file).read_text(encoding="utf-8")), *lines]
     return {INCIDENTS: "\n".join(lines) or "none"}
 
@@ -136,6 +136,8 @@ def _say(parser: CommandParser, options: argparse.Namespace, node: RecorderNode,
     missing = sorted(named.intersection(node.never_appeared))
     for topic in missing:
         complain(parser.prog, f"{topic} was named with --topic and never appeared")
+    for fault in node.faults():
+        complain(parser.prog, fault, "not as it should be")
     if node.failure:
         complain(parser.prog, node.failure)
     if options.summary:
