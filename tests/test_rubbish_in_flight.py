@@ -17,14 +17,12 @@ def _rubbish(mission, stamp_ns: int) -> dict[str, tuple[type, list[bytes]]]:
     voltages, command, estimate = codec_of(CssVoltages), codec_of(WheelTorqueCommand), codec_of(SunEstimate)
     ahead = stamp_ns + 10 * mission.period_ns
     good = np.full(8, 0.5)
-    nan = good.copy()
-    nan[3] = np.nan
     return {
         "css/voltages": (
             CssVoltages,
             [
                 voltages.encode(voltages.sample(ahead, "bus", voltages=good[:7])),
-                voltages.encode(voltages.sample(ahead, "bus", voltages=nan)),
+                voltages.encode(voltages.sample(ahead, "bus", voltages=good * np.nan)),
                 voltages.encode(voltages.sample(ahead, "bus", voltages=good * np.inf)),
                 voltages.encode(voltages.sample(stamp_ns - 10 * mission.period_ns, "bus", voltages=good)),
                 voltages.encode(voltages.sample(stamp_ns + 10**17, "bus", voltages=good)),

@@ -12,8 +12,8 @@ from rclpy.node import Node
 
 from css_bringup.commands.fly import conclude
 from css_bringup.composed import ComposedFlight
-from css_bringup.options import FAILED
 from css_common.codec import codec_of
+from css_common.command import FAILED
 from css_common.executor import retire
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
 from css_common.sole_subscription import SoleSubscription

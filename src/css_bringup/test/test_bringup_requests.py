@@ -45,7 +45,7 @@ def test_requests_of_another_form_are_refused(text):
     [
         (["no_such_mission"], "no_such_mission"),
         (["okeefe_2013", "--set", "cells.field_of_vew_deg=100"], "did you mean cells.field_of_view_deg?"),
-        (["okeefe_2013", "--set", "cells.field_of_view_deg=190"], "[deg], at least 1 and at most 180"),
+        (["okeefe_2013", "--set", "cells.field_of_view_deg=190"], "at least 1 and at most 180 [deg]"),
         (["[/red]"], "[/red]: no such mission file"),
         (["okeefe_2013", "--set", "spacecraft.inertia=1,0,0,0,1,0,0,0,9"], "triangle inequality"),
         (["okeefe_2013", "--set", "wheels.axes=1,0,0,0,1,0,0,1,0"], "span 2 of 3"),

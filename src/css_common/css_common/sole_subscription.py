@@ -35,7 +35,7 @@ _TAKE_EVERY = 0.001
 _LOOK_AGAIN_AFTER = 20  # takes
 _NAMELESS = "a node without a name"
 _UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
-_REFUSED_TOPIC = "_refused"  # hidden, and nobody writes it
+_NOBODYS_TOPIC = "/_nobody"  # hidden, and nobody writes below it
 
 
 class SoleSubscription:
@@ -261,8 +261,10 @@ class SoleSubscription:
             return  # it was never the executor's
         if self._nobody is None:
             with self._node.handle:
+                # a topic of one type has no reader of another, so each has a name of its own
+                nobodys = f"{_NOBODYS_TOPIC}{self.topic}"
                 self._nobody = _rclpy.Subscription(
-                    self._node.handle, self._type, _REFUSED_TOPIC, self._qos.get_c_qos_profile()
+                    self._node.handle, self._type, nobodys, self._qos.get_c_qos_profile()
                 )
         self._show_executor(self._nobody)
 

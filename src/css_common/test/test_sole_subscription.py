@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A subscription of the real middleware hears one writer, whatever others do."""
 
+from functools import partial
+
 import pytest
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
-from std_msgs.msg import Int64
+from std_msgs.msg import Int64, String
 
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_common.sole_subscription import SoleSubscription
@@ -216,3 +218,31 @@ def test_successor_whose_predecessor_is_forgotten_late_loses_nothing(listener):
     listener.until_heard(1, 2, 3, 4)
     assert listener.hand_overs == [1]
     assert not listener.subscription.refused
+
+
+def test_topics_of_different_types_have_strangers_at_once(bench):
+    node, stranger, ours = (
+        Node(name, context=bench.context, use_global_arguments=False) for name in ("listener", "stranger", "ours")
+    )
+    for made in (node, stranger, ours):
+        bench.add(made)
+    heard: list[object] = []
+    topics = {"numbers": (Int64, Int64(data=1)), "words": (String, String(data="one"))}
+    subscriptions = []
+    for topic, (kind, _) in topics.items():
+        take = partial(_append_decoded, heard, kind)
+        subscriptions.append(SoleSubscription(node, kind, topic, take, LOOP_SUBSCRIPTION, WriterChoice("/ours")))
+    publishers = {topic: ours.create_publisher(kind, topic, LOOP_PUBLISHER) for topic, (kind, _) in topics.items()}
+    for topic, (_, message) in topics.items():
+        publishers[topic].publish(message)
+    bench.until(lambda: len(heard) == 2, "both are heard")
+    for topic, (kind, message) in topics.items():
+        stranger.create_publisher(kind, topic, LOOP_PUBLISHER).publish(message)
+    bench.until(lambda: all(s.refused["/stranger"] == 1 for s in subscriptions), "both strangers are refused")
+    for subscription in subscriptions:
+        subscription.destroy()
+    assert heard == [1, "one"]
+
+
+def _append_decoded(heard: list[object], kind: type, data: bytes) -> None:
+    heard.append(deserialize_message(data, kind).data)

@@ -143,9 +143,3 @@ def test_the_log_equals_the_one_of_a_recording(tmp_path):
 def test_missions_that_cannot_fly_are_refused():
     with pytest.raises(MissionError, match="nothing can fly"):
         fly_directly(mission_from_text("/**: {ros__parameters: {graph: {nodes: []}}}", "no plant"))
-
-
-def test_a_flight_shorter_than_a_step():
-    log = fly_directly(short(duration=0.04))
-    assert len(log.truth) == 1
-    assert estimator_runs(log)[0]["heading_error_mean_deg"] is None

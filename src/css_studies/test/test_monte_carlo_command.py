@@ -81,7 +81,7 @@ def test_mission_that_is_not_covered_is_said_before_anything_starts(mission, tmp
         assert main([mission, "--out", str(tmp_path / "s"), *arguments]) == 2
         err = capsys.readouterr().err
         assert f"{mission}.yaml: the Monte Carlo does not cover this mission: {UNCOVERED[mission]}" in err
-        assert err.startswith("monte-carlo: ") and err.count("\n") == 1
+        assert err.startswith("monte_carlo: error: ") and err.count("\n") == 1
         assert not (tmp_path / "s").exists()
 
 
