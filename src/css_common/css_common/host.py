@@ -240,7 +240,12 @@ class ComponentNode(LifecycleNode):
         return publisher, output.topic
 
     def _subscribe(
-        self, message_type: type, topic: str, callback: Callable[[bytes], None], on_hand_over=lambda: None
+        self,
+        message_type: type,
+        topic: str,
+        callback: Callable[[bytes], None],
+        on_hand_over: Callable[[], object] = lambda: None,
+        publisher: str = "",
     ) -> None:
         self.subscriptions_made.append(
             SoleSubscription(
@@ -249,7 +254,7 @@ class ComponentNode(LifecycleNode):
                 topic,
                 callback,
                 LOOP_SUBSCRIPTION,
-                writer_choice(self.mission, topic, self.get_namespace()),
+                writer_choice(self.mission, topic, self.get_namespace(), node=publisher),
                 overriding=_OVERRIDES,
                 on_hand_over=on_hand_over,
             )

@@ -20,7 +20,7 @@ from css_common.codec import DecodeError, Sample, stamp_of
 from css_common.component import Outgoing, Plant
 from css_common.edge import HISTORY, Edge
 from css_common.host import ComponentNode
-from css_common.qos import PROGRESS_TOPIC
+from css_common.qos import PROGRESS_TOPIC, RECORDER
 from css_common.rcl_errors import endpoint
 from css_common.sole_subscription import writers_of
 from css_common.writers import Writer, local_processes, runs
@@ -89,7 +89,7 @@ class PlantNode(ComponentNode):
                     self._subscribe(self.mission.topics[topic], topic, partial(self._note, topic, self.component))
         if lockstep.wait_for_recorder:
             self._recorded_ns = self.mission.epoch_ns - self.component.period_ns
-            self._subscribe(Header, PROGRESS_TOPIC, self._note_recorded)
+            self._subscribe(Header, PROGRESS_TOPIC, self._note_recorded, publisher=RECORDER)
         if lockstep.publish_clock:
             self._clock_publisher = self.create_publisher(Clock, "/clock", 10)
         self._watch_every = min(0.5, 0.5 * lockstep.warn_after)

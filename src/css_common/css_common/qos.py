@@ -16,7 +16,10 @@ LOOP_PUBLISHER = QoSProfile(
 )
 """Topics of the control loop: a node that was restarted receives the stamp that waits for its answer."""
 
-PROGRESS_TOPIC = "recorder/progress"
+RECORDER = "recorder"
+"""Name of the node that records a flight."""
+
+PROGRESS_TOPIC = f"{RECORDER}/progress"
 """`std_msgs/Header`: the stamp up to which the recorder of a flight has every message."""
 
 LOOP_SUBSCRIPTION = QoSProfile(

@@ -32,7 +32,7 @@ from css_common.raw_take import take_with_writer
 from css_common.writers import Writer, WriterChoice
 
 _TAKE_EVERY = 0.001
-_LOOK_AGAIN_AFTER = 20  # takes
+_LOOK_AGAIN_AFTER = 100  # takes
 _NAMELESS = "a node without a name"
 _UNKNOWN_NODE = "_NODE_NAME_UNKNOWN_"
 _NOBODYS_TOPIC = "/_nobody"  # hidden, and nobody writes below it
@@ -85,6 +85,7 @@ class SoleSubscription:
         self._takes = 0
         self._ended = False
         self._matched = (0, 0)
+        self._unlisted = False
         # rclpy writes overrides into the profile that it is given
         self._subscription = self._subscribe(copy.copy(qos), overriding)
 
@@ -166,22 +167,32 @@ class SoleSubscription:
     def _look(self) -> None:
         if self._ended:
             return
-        if self._choice.update(self._present()):
+        present = self._present()
+        # the middleware matches a writer in one thread and lists it in another
+        self._unlisted = self.publisher_count > len(present)
+        if self._choice.update(present):
             self.handed_over += 1
             self._report(f"{self.topic}: {self._name(self._choice.accepted)} took over")
             self._on_hand_over()
             self._hear_kept()
         self._name_strangers()
-        if self._choice.accepted is not None and not self._choice.strangers:
+        somebody = self._choice.accepted is not None
+        others = bool(self._choice.strangers) or self._unlisted
+        if somebody and not others:
             self._take_waiting()
             self._stop_taking()
             self._give_to_executor()
-        elif self._choice.accepted is not None or self._choice.strangers:
+        elif somebody or others:
             self._take_from_executor()
             self._start_taking()
 
     def _present(self) -> list[Writer]:
         return writers_of(self._node, self.topic, self._qos)
+
+    @property
+    def _undecided(self) -> bool:
+        """Somebody who is not known yet may be the one to hear."""
+        return self._choice.undecided or (self._choice.accepted is None and self._unlisted)
 
     def _name_strangers(self) -> None:
         for stranger in self._choice.strangers:
@@ -221,7 +232,7 @@ class SoleSubscription:
         self._take_waiting()
 
     def _take_waiting(self) -> None:
-        while not self._choice.undecided:
+        while not self._undecided:
             taken = take_with_writer(self._handle)
             if taken is None:
                 return

@@ -48,7 +48,9 @@ def _runs(process: str) -> bool:
     return text.rpartition(")")[2].split()[:1] not in (["Z"], ["X"])
 
 
-def writer_choice(mission: Mission, topic: str, namespace: str, *, only: bool | None = None) -> WriterChoice:
+def writer_choice(
+    mission: Mission, topic: str, namespace: str, *, only: bool | None = None, node: str = ""
+) -> WriterChoice:
     """Who may speak on a topic of a mission.
 
     Args:
@@ -56,12 +58,13 @@ def writer_choice(mission: Mission, topic: str, namespace: str, *, only: bool | 
         topic: relative name, as in the mission.
         namespace: of the listening node, and so of the graph.
         only: whether the node of the graph alone may speak; None: as the mission says (`io.writers`).
+        node: name of the node that publishes a topic which is not the graph's.
     """
-    name = mission.publishers.get(topic, "")
-    node = f"{namespace.rstrip('/')}/{name}" if name else ""
+    name = mission.publishers.get(topic, node)
+    full_name = f"{namespace.rstrip('/')}/{name}" if name else ""
     if only is None:
         only = mission.values.io.writers == "graph"
-    return WriterChoice(node, only=only and bool(node))
+    return WriterChoice(full_name, only=only and bool(full_name))
 
 
 class WriterChoice:

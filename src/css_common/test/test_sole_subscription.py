@@ -246,3 +246,19 @@ def test_topics_of_different_types_have_strangers_at_once(bench):
 
 def _append_decoded(heard: list[object], kind: type, data: bytes) -> None:
     heard.append(deserialize_message(data, kind).data)
+
+
+def test_writer_that_is_matched_before_it_is_listed_is_not_mistaken_for_the_one_heard(listener, monkeypatch):
+    ours = listener.sender("ours")
+    send(ours, 1)
+    listener.until_heard(1)
+    listed = listener.subscription._present
+    monkeypatch.setattr(listener.subscription, "_present", lambda: [w for w in listed() if w.node == "/ours"])
+    stranger = listener.sender("stranger")
+    listener.bench.until(lambda: listener.subscription.publisher_count == 2, "the stranger is matched")
+    send(stranger, 1000)
+    send(ours, 2)
+    listener.until_heard(1, 2)
+    monkeypatch.undo()
+    send(stranger, 1001)
+    listener.until_refused("/stranger", 1)

@@ -27,7 +27,7 @@ from css_common.codec import type_name
 from css_common.diagnostics import Diagnostics, Health
 from css_common.epochs import format_utc
 from css_common.mission import Mission
-from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION, matching_qos
+from css_common.qos import LOOP_PUBLISHER, RECORDER, RECORDER_SUBSCRIPTION, matching_qos
 from css_common.sole_subscription import SoleSubscription
 from css_common.writers import writer_choice
 from css_recording.bag_metadata import Topic, absolute
@@ -90,7 +90,7 @@ class RecorderNode(Node):
         Raises:
             BagError: the recording cannot be created.
         """
-        super().__init__("recorder", context=context, use_global_arguments=use_global_arguments)
+        super().__init__(RECORDER, context=context, use_global_arguments=use_global_arguments)
         self.failure = ""
         self._everything = everything
         self._choice = choice or RecordingChoice()
