@@ -37,10 +37,14 @@ def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: C
     """
     recording = str(bag.absolute()) if bag else ""
     with domains.own(os.environ, mission.name, recording=recording, asked=asked) as held:
+        before = {name: os.environ.pop(name, None) for name in (network.DOMAIN, domains.JOINED)}
         os.environ[network.DOMAIN] = str(held.domain)
-        os.environ.pop(domains.JOINED, None)
         console.print(f"ROS domain {held.domain}; ./sunpoint shell, record and play join it", soft_wrap=True)
-        yield held.domain
+        try:
+            yield held.domain
+        finally:
+            del os.environ[network.DOMAIN]
+            os.environ.update({name: value for name, value in before.items() if value is not None})
 
 
 def fly(
