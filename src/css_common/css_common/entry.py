@@ -15,8 +15,6 @@ from pathlib import Path
 from css_common import network, supervised
 
 _USAGE = 2
-# What a node's `main` loads, ROS above all: an interrupt in the middle of that got lost.
-_NODE_LIBRARIES = "css_common.node_process"
 _INTERRUPTED = 130
 
 
@@ -48,8 +46,6 @@ def _module(executable: Path):
     for folder in ("nodes", "commands"):
         module = f"{package}.{folder}.{name}"
         if importlib.util.find_spec(f"{package}.{folder}") and importlib.util.find_spec(module):
-            if folder == "nodes":
-                importlib.import_module(_NODE_LIBRARIES)
             return importlib.import_module(module)
     raise SystemExit(f"{executable}: there is no {package}/nodes/{name}.py or {package}/commands/{name}.py")
 
