@@ -12,8 +12,10 @@ import shutil
 import signal
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 sys.path.append(str(Path(__file__).parent / "src" / "css_common"))  # also where nothing is built
@@ -41,6 +43,15 @@ settings.load_profile("sunpoint")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A runner in the background ignores the interrupt, and so would every process that a test starts and interrupts.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True)
+def _signals_as_they_were() -> Iterator[None]:
+    """A node that ends in this process leaves signals ignored, and processes of later tests would inherit that."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+    yield
+    for number, handler in before.items():
+        signal.signal(number, handler)
 
 
 def pytest_report_header() -> str:

@@ -142,7 +142,8 @@ def test_second_flight_in_the_same_domain_ends_before_it_begins(tmp_path):
     with ComposedFlight(mission, tmp_path / "first") as first, ComposedFlight(mission) as second:
         for node in first.nodes.values():
             assert node.start()
-        first.executor.spin_once(timeout_sec=0.01)
+        while second.plant.count_publishers("truth") == 0:  # it knows of the first as soon as the middleware tells
+            first.executor.spin_once(timeout_sec=0.01)
         result = second.fly()
     assert "two flights in one ROS_DOMAIN_ID" in result.failure
 
