@@ -161,7 +161,7 @@ class ComposedFlight:
             now = time.monotonic()
             if now > due:
                 due = now + _PROGRESS_EVERY
-                progress((plant.stamp_ns - epoch) * 1e-9)
+                progress((plant.stamp_ns - epoch) * 1e-9 if plant.begun else 0.0)
             return done()
 
         spin_until(self.executor, done_with_progress, context=self.context)

@@ -51,7 +51,7 @@ def still_working(what: str) -> Iterator[None]:
 
     def tell() -> None:
         while not over.wait(EVERY):
-            _say(f"{what}: {time.monotonic() - began:.0f} s so far")
+            _say(f"{what}: {time.monotonic() - began:.0f} s of wall time so far")
 
     teller = threading.Thread(target=tell, name="progress", daemon=True)
     teller.start()

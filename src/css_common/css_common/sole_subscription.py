@@ -299,7 +299,7 @@ class SoleSubscription:
             f"qos_overrides.{self.topic}.subscription.durability: {adapted.durability.short_key}, "
             f"qos_overrides.{self.topic}.subscription.reliability: {adapted.reliability.short_key}"
         )
-        names = ", ".join(sorted({_node_name(found) for found in offers}))
+        names = ", ".join(sorted({_node_name(found) or _NAMELESS for found in offers}))
         if self._overridden:
             self._node.get_logger().error(f"{self.topic}: {names} offers less than is asked for; set {advice}")
             return

@@ -33,5 +33,5 @@ def test_what_takes_long_says_so_until_it_ends(capsys, monkeypatch):
     with still_working("replaying bags/a"):
         assert told.acquire(timeout=30.0)
     lines = capsys.readouterr().err.splitlines()
-    assert lines and all(re.fullmatch(r"replaying bags/a: \d+ s so far", line) for line in lines)
+    assert lines and all(re.fullmatch(r"replaying bags/a: \d+ s of wall time so far", line) for line in lines)
     assert all(thread.name != "progress" for thread in threading.enumerate())
