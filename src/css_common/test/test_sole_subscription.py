@@ -260,5 +260,6 @@ def test_writer_that_is_matched_before_it_is_listed_is_not_mistaken_for_the_one_
     send(ours, 2)
     listener.until_heard(1, 2)
     monkeypatch.undo()
+    listener.matched(2)
     send(stranger, 1001)
     listener.until_refused("/stranger", 1)
