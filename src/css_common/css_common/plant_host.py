@@ -184,7 +184,8 @@ class PlantNode(ComponentNode):
         own_name = self.get_fully_qualified_name()
         for *_, topic in self._output_ports.values():
             writers = writers_of(self, topic)
-            others = [writer for writer in writers if writer.node != own_name]
+            # one whose node is not known yet may be of a second flight, and is waited for
+            others = [writer for writer in writers if writer.node not in (own_name, "")]
             if self.mission.values.io.writers == "graph" and len(writers) - len(others) < 2:
                 continue  # no listener mistakes another node for this one
             rivals += [(topic, writer) for writer in others or writers[1:]]

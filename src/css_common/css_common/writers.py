@@ -135,7 +135,9 @@ class WriterChoice:
     def _without_dead(self, writers: list[Writer], processes: Callable[[], frozenset[int]]) -> list[Writer]:
         if len(writers) < 2 and all(writer.gid in self._seen_running for writer in writers):
             return writers  # it stays while the middleware knows it
-        now = processes()
+        own = os.getpid() & 0xFFFF
+        # writers of this very process run: a composed flight need not look at all others for each of its topics
+        now = frozenset((own,)) if all(_process_of(writer.gid) == own for writer in writers) else processes()
         running = []
         for writer in writers:
             if runs(writer, now):
