@@ -12,6 +12,7 @@ import pytest
 from flights import messages_by_topic
 
 from css_bringup.processes import executable_path
+from css_common.places import scratch
 
 LIMIT_S = 200.0  # a loaded machine takes its time to start six processes
 
@@ -52,7 +53,7 @@ def flight(tmp_path):
     mission = Path(__file__).parents[1] / "config" / "okeefe_2013.yaml"
     command = [executable_path("css_bringup", "fly"), mission, "--duration", "50000", "--processes", "--out", bag]
     environment = os.environ | {"SUNPOINT_HOME": str(tmp_path)}
-    environment.pop("SUNPOINT_KERNEL_CACHE", None)  # compiled kernels stay where they are
+    (tmp_path / ".cache").symlink_to(scratch("kernels").parent)  # compiled kernels stay where they are
     supervisor = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
     try:
         _until(lambda: any(file.stat().st_size > 50_000 for file in bag.glob("*.mcap")), "the flight is under way")

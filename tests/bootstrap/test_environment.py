@@ -136,3 +136,9 @@ def test_filtered_lock_keeps_every_hash_of_what_remains():
     c = ["c==2 ; x < '3' \\", "    --hash=sha256:4"]
     lock = "\n".join(["# a comment", *a, *ros, "# another", *c, ""])
     assert for_system(lock, has_colcon=True).splitlines() == [*a, *c]
+
+
+def test_bytecode_is_kept_also_where_it_is_switched_off(tmp_path):
+    env = compose({"SUNPOINT_HOME": str(tmp_path), "PYTHONDONTWRITEBYTECODE": "1"}, Environment())
+    assert "PYTHONDONTWRITEBYTECODE" not in env
+    assert env["PYTHONPYCACHEPREFIX"] == str(tmp_path / ".cache" / "bytecode")

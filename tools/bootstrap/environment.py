@@ -105,6 +105,10 @@ def compose(base: Mapping[str, str], environment: Environment) -> dict[str, str]
         logs = places.logs(env)
         env.setdefault("ROS_HOME", str(logs))
         env.setdefault("ROS_LOG_DIR", str(logs / "ros"))
+    # Containers switch bytecode off to keep their layers small; compiling numba, scipy and matplotlib from source at
+    # every start costs seconds. Kept apart, it litters no folder, and one that is read-only has bytecode all the same.
+    env.pop("PYTHONDONTWRITEBYTECODE", None)
+    env["PYTHONPYCACHEPREFIX"] = str(places.scratch("bytecode", env))
     env.setdefault("RMW_IMPLEMENTATION", "rmw_fastrtps_cpp")
     env.setdefault("MPLBACKEND", "Agg")
     return env

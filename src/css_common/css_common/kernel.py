@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The one decorator that compiles Sunpoint's algorithms, and the place of the compile cache.
+"""The decorators that compile Sunpoint's algorithms, and the place of the compile cache.
 
 Numba checks only the file of the function it loads from its cache: a cached caller keeps an old copy of a
-function that lives in another file. The cache folder is therefore named by a hash of every source file that
-can hold a kernel, and of the versions that compile them: edit one, and all are compiled anew.
+function that lives in another file. The cache folder of a kernel is therefore named by a hash of every source file
+that it can be made from, and of the versions that compile it: edit one, and what is made from it is compiled anew.
 """
 
-import hashlib
-import importlib.util
 import os
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -18,56 +17,36 @@ import llvmlite
 import numba
 
 from css_common import places
+from css_common.kernel_sources import hash_of, kernel_modules, sources_of
 
-KERNEL_PACKAGES = (
-    "css_common",
-    "css_environment",
-    "css_sim",
-    "css_estimation",
-    "sunpoint_control",
-    "css_studies",
-)
-# Folders that call kernels but define none: an edit there must not cost a compilation.
-_NOT_KERNELS = {"nodes", "commands", "data", "test"}
-
-
-def kernel_source_hash() -> str:
-    """Hash of all sources that can hold kernels and of the compiler that reads them."""
-    digest = hashlib.sha256(
-        f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__}".encode()
-    )
-    for package in KERNEL_PACKAGES:
-        spec = importlib.util.find_spec(package)
-        if spec is None or not spec.submodule_search_locations:
-            continue
-        root = Path(spec.submodule_search_locations[0])
-        for source in sorted(root.rglob("*.py")):
-            relative = source.relative_to(root)
-            if _NOT_KERNELS.isdisjoint(relative.parts):
-                digest.update(f"{package}/{relative}".encode())
-                digest.update(source.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def cache_folder() -> Path:
-    """Folder of the compiled kernels: inside the project when started by `./sunpoint`, else the user's cache."""
-    return places.scratch("kernels") / kernel_source_hash()
-
-
-def _use_cache_folder() -> None:
-    # Numba reads its environment anew whenever any NUMBA_ variable changes, so the folder must stand there and not
-    # only in its configuration. A child process inherits it but may find edited sources: it names its own.
-    chosen_by_us = os.environ.get("SUNPOINT_KERNEL_CACHE")
-    if os.environ.get("NUMBA_CACHE_DIR") in (None, chosen_by_us):
-        folder = str(cache_folder())
-        os.environ["NUMBA_CACHE_DIR"] = os.environ["SUNPOINT_KERNEL_CACHE"] = folder
-        numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]  # made at run time
-
-
-_use_cache_folder()
-
+_COMPILER = f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__}"
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": False}
 _UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
+
+
+@cache
+def study_hash(module: str) -> str:
+    """Hash of all that a module of studies compiles: what it imports, all kernels below it, and the compiler."""
+    return hash_of(kernel_modules() | sources_of(module), _COMPILER)
+
+
+@cache
+def cache_folder(module: str) -> Path:
+    """Folder of a module's compiled kernels: inside the project when started by `./sunpoint`, else the user's cache."""
+    return _kernels() / hash_of(sources_of(module), _COMPILER)
+
+
+@cache
+def _kernels() -> Path:
+    return places.scratch("kernels")
+
+
+def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any]) -> Any:
+    # Numba takes the folder that its configuration names while it makes the dispatcher, and reads the configuration
+    # anew from its environment whenever a variable of it has changed.
+    if not os.environ.get("NUMBA_CACHE_DIR"):
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # made at run time
+    return numba.njit(**options)(function)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
@@ -80,7 +59,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     Raises:
         TypeError: at the first call, when the function returns an array.
     """
-    dispatcher: Any = numba.njit(**_UNCOUNTED)(function)
+    dispatcher: Any = _compiled(function, cache_folder(function.__module__), _UNCOUNTED)
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         return dispatcher
     compile_types = dispatcher.compile
@@ -96,8 +75,12 @@ def kernel(function: Callable[..., Any]) -> Any:
     return dispatcher
 
 
-outer_kernel = numba.njit(**_OPTIONS, nogil=True)
-"""Compiles the outermost loops of a study: they may make and return arrays, and other threads go on meanwhile."""
+def outer_kernel(function: Callable[..., Any]) -> Any:
+    """Compiles an outermost loop of a study: it may make and return arrays, and other threads go on meanwhile.
+
+    Which kernels it calls may follow from the types of its arguments: it is compiled anew with any of them.
+    """
+    return _compiled(function, _kernels() / study_hash(function.__module__), _OPTIONS | {"nogil": True})
 
 
 def _holds_array(numba_type: Any) -> bool:

@@ -14,7 +14,9 @@ from pathlib import Path
 import pytest
 
 import css_common.kernel
+import css_common.kernel_sources
 import css_common.places
+from css_common.kernel_sources import kernel_modules, sources_of
 
 INNER = "from css_common.kernel import kernel\n@kernel\ndef inner(x):\n    return x + {}\n"
 OUTER = (
@@ -40,7 +42,7 @@ class Project:
         for package in ("css_common", "css_environment", "css_sim", "css_sim/nodes"):
             (root / package).mkdir()
             (root / package / "__init__.py").touch()
-        for module in (css_common.kernel, css_common.places):
+        for module in (css_common.kernel, css_common.kernel_sources, css_common.places):
             shutil.copy(module.__file__, root / "css_common")
         self.write_inner("1.0")
         (root / "css_sim" / "outer.py").write_text(OUTER)
@@ -100,15 +102,6 @@ def test_folder_chosen_by_the_user_is_used(project):
     assert Path(project.run(NUMBA_CACHE_DIR=str(chosen))["folder"]).is_relative_to(chosen)
 
 
-def test_child_that_finds_edited_sources_does_not_inherit_the_folder(project):
-    parent = project.run()
-    project.write_inner("2.0")
-    folder = str(Path(parent["folder"]).parent)
-    child = project.run(NUMBA_CACHE_DIR=folder, SUNPOINT_KERNEL_CACHE=folder)
-    assert child["result"] == 30.0
-    assert child["folder"] != parent["folder"]
-
-
 def test_change_of_a_numba_variable_does_not_move_the_cache(project):
     # numba reads its whole environment again at the next compilation
     meddle = (
@@ -119,15 +112,45 @@ def test_change_of_a_numba_variable_does_not_move_the_cache(project):
     assert Path(project.run(before=meddle)["folder"]).is_relative_to(project.home)
 
 
-def test_only_files_that_can_hold_kernels_name_the_folder(project):
+def test_only_what_a_kernel_is_made_from_names_its_folder(project):
     before = project.run()
-    for path in ("css_sim/nodes/array.py", "css_sim/data/table.py", "css_sim/test/test_x.py"):
+    for path in ("css_sim/nodes/array.py", "css_sim/data/table.py", "css_sim/other.py", "css_environment/other.py"):
         file = project.root / path
         file.parent.mkdir(exist_ok=True)
-        file.write_text("x = 1\n")
-    assert project.run()["folder"] == before["folder"]
-    (project.root / "css_sim" / "other.py").touch()
+        file.write_text("from css_common.kernel import kernel\nx = 1\n")
+    assert project.run() == before | {"hits": 1}
+
+
+def test_edit_two_imports_away_counts(project):
+    (project.root / "css_sim" / "constants.py").write_text("TERM = 1.0\n")
+    inner = project.root / "css_environment" / "inner.py"
+    inner.write_text("from css_sim.constants import (  # by name\n    TERM,\n)\n" + INNER.format("TERM"))
+    assert project.run()["result"] == 20.0
+    (project.root / "css_sim" / "constants.py").write_text("TERM = 3.0\n")
+    assert project.run()["result"] == 40.0
+
+
+def test_a_loop_is_made_from_every_kernel_that_it_may_be_handed(project):
+    # nothing that is imported by the loop: called by the type of an argument, as an estimator is
+    (project.root / "css_sim" / "outer.py").write_text(
+        "from css_common.kernel import outer_kernel\n@outer_kernel\ndef outer(x):\n    return 20.0 * x\n"
+    )
+    before = project.run()
+    assert project.run() == before | {"hits": 1}
+    project.write_inner("2.0")
     assert project.run()["folder"] != before["folder"]
+
+
+def test_imports_are_followed_as_python_writes_them():
+    sources = {source.stem for source in sources_of("css_estimation.sunline_ekf")}
+    assert {"sunline_ekf", "vectors", "attitude", "low_pass", "kernel"} <= sources
+    assert not {"wls", "numpy", "typing", "mission"} & sources
+    assert {source.stem for source in kernel_modules()} >= {
+        "sunline_ekf",
+        "sun_cells",
+        "rigid_body",
+        "wheel_allocation",
+    }
 
 
 def test_without_a_project_the_users_cache_is_taken(project):

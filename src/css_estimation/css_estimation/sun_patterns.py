@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from css_common.kernel import kernel, outer_kernel
+from css_common.kernel import kernel
 from css_estimation.cell_layout import CellLayout, brightest, sees
 from css_estimation.lit_cells import Gate, lit_cells
 
@@ -35,9 +35,8 @@ def _sphere() -> np.ndarray:
     return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=1)
 
 
-@outer_kernel
-def _masks(layout: CellLayout, gate: Gate, sphere, masks_out) -> None:
-    voltages = np.zeros(layout.cells.shape[0])
+@kernel
+def _masks(layout: CellLayout, gate: Gate, sphere, voltages, masks_out) -> None:
     for k in range(sphere.shape[0]):
         s = (sphere[k, 0], sphere[k, 1], sphere[k, 2])
         for i in range(voltages.shape[0]):
@@ -50,7 +49,7 @@ def sun_patterns(layout: CellLayout, gate: Gate) -> np.ndarray:
     """Table (P,) of PATTERN, by rising mask: all sets of cells that some direction of the Sun puts above the gate."""
     sphere = _sphere()
     masks = np.zeros(len(sphere), dtype=np.int64)
-    _masks(layout, gate, sphere, masks)
+    _masks(layout, gate, sphere, np.zeros(layout.cells.shape[0]), masks)
     found, which, count = np.unique(masks, return_inverse=True, return_counts=True)
 
     def mean_of(values: np.ndarray) -> np.ndarray:

@@ -10,12 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from css_common.kernel import kernel_source_hash
+from css_common.kernel import study_hash
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_studies.direct_flight import configured
 from css_studies.monte_carlo.case_figures import SAMPLED
 from css_studies.monte_carlo.case_table import FIGURES
+from css_studies.monte_carlo import chunk
 from css_studies.monte_carlo.chunk import ChunkTask
 from css_studies.monte_carlo.percentiles import over_cases
 from css_studies.monte_carlo.schedulers import Scheduler, ThreadScheduler
@@ -167,7 +168,7 @@ def _manifest(
         "sample_every_steps": sample_every,
         "configurations": [configuration.columns for configuration in configurations],
         # results of other sources or compilers must not be mixed
-        "algorithms": kernel_source_hash(),
+        "algorithms": study_hash(chunk.__name__),
         "versions": {name: version(name) for name in ("numba", "numpy", "pyerfa", "ppigrf", "pyarrow")},
     }
 
