@@ -92,10 +92,8 @@ def _source(module: str) -> Path | None:
         return None
     folder = _folder(package)
     if folder is None:
-        loaded = sys.modules.get(module)
-        file = getattr(loaded, "__file__", None)
-        is_ours = file is not None and file.endswith(".py") and not rest and not _is_installed(Path(file))
-        return Path(file) if is_ours else None
+        file = Path(getattr(sys.modules.get(module), "__file__", None) or "")
+        return file if file.suffix == ".py" and not rest and not _is_installed(file) else None
     for source in (folder.joinpath(*rest).with_suffix(".py") if rest else None, folder.joinpath(*rest, "__init__.py")):
         if source is not None and source.is_file():
             return source
