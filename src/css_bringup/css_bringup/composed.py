@@ -16,7 +16,7 @@ from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.node_process import create_node
 from css_common.plant_host import PlantNode
-from css_recording.recorder import INCIDENTS, RecorderNode
+from css_recording.recorder import RecorderNode
 
 _PROGRESS_EVERY = 0.2
 
@@ -132,9 +132,8 @@ class ComposedFlight:
         result.notes += node_incidents(self.mission, {n: node.health().counters for n, node in self.nodes.items()})
         if self.recorder is not None:
             self._drain(self.recorder)
-            faults = self.recorder.faults()
-            self.recorder.close({INCIDENTS: "\n".join((*result.notes, *faults)) or "none"})
-            result.notes += [f"recorder: {fault}" for fault in faults]
+            self.recorder.close(result.notes)
+            result.notes += [f"recorder: {fault}" for fault in self.recorder.faults()]
             topics = {f"/{topic}" for topic in self.mission.topics}
             result.recorded = {t: n for t, n in self.recorder.counts.items() if t in topics}
             if self.recorder.failure:

@@ -40,6 +40,7 @@ class Input:
             that becomes NaN, a message without any reading is refused.
         heeded: False while the values make nothing of it (a gyro that is not to be used): its messages are then
             neither waited for nor handed over, whatever they are. May change when values do.
+        switch: parameter that says so, for those who wait in vain for a message.
     """
 
     key: str
@@ -52,6 +53,7 @@ class Input:
     frame: str = BODY
     readings: Mapping[str, Readings] = field(default_factory=dict)
     heeded: bool = True
+    switch: str = ""
 
 
 @dataclass(frozen=True)

@@ -462,6 +462,12 @@ class ComponentNode(LifecycleNode):
         state = "active" if self._is_active else "inactive"
         return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)
 
+    def _named(self, topic: str) -> str:
+        """A topic, and how to do without it."""
+        assert self.matcher is not None
+        switch = next(i.switch for i in self.matcher.inputs.values() if i.topic == topic)
+        return f"{topic} (not when parameter {switch} is false)" if switch else topic
+
     def _unmet(self) -> str:
         """Which messages did not come, for cycles that did not run or have waited since the last look; warns once."""
         if self.matcher is None:
@@ -469,7 +475,7 @@ class ComponentNode(LifecycleNode):
         lines = self.matcher.complaints()
         waiting = self.matcher.oldest_pending()
         if waiting is not None and waiting == self._waiting_stamp:
-            lines.append(f"stamp {waiting} ns waits for {', '.join(self.matcher.missing())}")
+            lines.append(f"stamp {waiting} ns waits for {', '.join(map(self._named, self.matcher.missing()))}")
         self._waiting_stamp = waiting
         text = "; ".join(lines)
         if text and not self._unmet_reported:

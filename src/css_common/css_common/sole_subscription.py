@@ -96,11 +96,6 @@ class SoleSubscription:
         with handle:
             return handle.get_publisher_count()
 
-    @property
-    def writer(self) -> Writer | None:
-        """The writer that is heard."""
-        return self._choice.accepted
-
     def destroy(self) -> None:
         """Ends the subscription; again does nothing."""
         if self._ended:

@@ -107,7 +107,7 @@ def test_what_a_node_waits_for_is_warned_about_once_and_stands_in_its_diagnostic
     rig.node.health()
     status = rig.node.health()
     assert status.level == DiagnosticStatus.WARN
-    assert status.message == f"stamp {T0} ns waits for gyro/imu"
+    assert status.message == f"stamp {T0} ns waits for gyro/imu (not when parameter use_gyro is false)"
     bench.until(lambda: bench.logged("waits for gyro/imu") == 1, "it is logged")
     rig.feed("voltages", 1)
     rig.feed("gyro", 1)

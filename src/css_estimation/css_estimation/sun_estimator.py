@@ -5,11 +5,10 @@ from collections.abc import Mapping
 from types import ModuleType
 from typing import ClassVar
 
-from sensor_msgs.msg import Imu, MagneticField
-
 from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
 from css_common.kernel import typed_call
 from css_common.schema import Values
+from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.eclipse_prediction import EclipsePrediction
 from css_estimation.low_pass import low_pass_gain
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields
@@ -34,19 +33,10 @@ class SunEstimator(Component):
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         inputs = [
             cells_input(values),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), heeded=values.use_gyro),
+            gyro_input(values),
         ]
         if values.rate.use_field:
-            inputs.append(
-                Input(
-                    "field",
-                    "mag/field",
-                    MagneticField,
-                    required=False,
-                    divider=values.magnetometer.divider,
-                    used=("magnetic_field",),
-                )
-            )
+            inputs.append(field_input(values))
         return tuple(inputs)
 
     @classmethod

@@ -10,7 +10,7 @@ Of a topic of the mission the messages of one writer are recorded; those of othe
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -41,7 +41,7 @@ from css_recording.second_buffer import SECOND_NS, BufferLimits
 from css_recording.split_bag_writer import SplitBagWriter
 
 PARAMETER_EVENTS = "/parameter_events"
-INCIDENTS = "incidents"
+_INCIDENTS = "incidents"
 """Entry of a recording that says what was not as it should be in the flight, one a line, or `none`."""
 _MEANING = {
     "repeated": "with the stamp of the one before",
@@ -175,14 +175,16 @@ class RecorderNode(Node):
             return Health(DiagnosticStatus.WARN, "waiting for publishers", counters, stamp_ns)
         return Health(DiagnosticStatus.OK, "recording", counters, stamp_ns)
 
-    def close(self, notes: Mapping[str, str] | None = None) -> None:
+    def close(self, incidents: Sequence[str] | None = None) -> None:
         """Finishes the recording; again does nothing.
 
         A disk that refuses is reported and noted in `failure`.
 
         Args:
-            notes: what is known of the flight at its end, for the recording itself.
+            incidents: what was not as it should be in the flight, beside the recorder's own faults; None when nobody
+                knows.
         """
+        notes = None if incidents is None else {_INCIDENTS: "\n".join((*incidents, *self.faults())) or "none"}
         self._guarded(partial(self._recorder.close, notes))
 
     def stop_listening(self) -> None:

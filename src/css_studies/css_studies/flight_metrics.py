@@ -45,6 +45,19 @@ QUANTITIES = {
 }
 """Measured quantities of a run and what they mean."""
 
+_NOT_ACQUIRED = "the flight or its truth has no 60 s with the Sun within 30 deg of the array normal, or none after them"
+_NOT_SETTLED = "no attitude was estimated after the first 300 s"
+WITHOUT_VALUE = {
+    "power_positive_s": _NOT_ACQUIRED,
+    "heading_error_mean_deg": _NOT_ACQUIRED,
+    "heading_error_p95_deg": _NOT_ACQUIRED,
+    "pointing_error_mean_deg": _NOT_ACQUIRED,
+    "attitude_error_mean_deg": _NOT_SETTLED,
+    "attitude_error_p95_deg": _NOT_SETTLED,
+    "attitude_nees": _NOT_SETTLED,
+}
+"""Why a quantity may have no value; others have one wherever there are truth and estimates."""
+
 
 def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: str | None = None) -> list[Run]:
     """What each estimator of a flight achieved: one dictionary with `QUANTITIES`, estimator, gyro and flown.

@@ -7,7 +7,7 @@ from typing import NamedTuple, TextIO
 from rich.console import Console
 
 from css_common.schema import unknown_name
-from css_studies.flight_metrics import QUANTITIES, Run
+from css_studies.flight_metrics import QUANTITIES, WITHOUT_VALUE, Run
 from css_studies.readable_table import ReadableTable
 
 _COLUMNS = {
@@ -117,6 +117,7 @@ def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterabl
 def _failure(missed: Verdict) -> str:
     where, criterion = f"{missed.estimator}: {missed.quantity}", f"criteria.{missed.quantity}"
     if missed.value is None:
-        return f"{where} has no value, but {criterion} asks for one"
+        why = WITHOUT_VALUE.get(missed.quantity, "truth or estimates are missing")
+        return f"{where} has no value, but {criterion} asks for one: {why}"
     side = "below" if missed.bound == "min" else "above"
     return f"{where} is {missed.value:.6g}, {side} {criterion}.{missed.bound} {missed.limit:g}"

@@ -3,12 +3,11 @@
 
 from collections.abc import Iterable
 
-from sensor_msgs.msg import Imu, MagneticField
-
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation import attitude_ekf, attitude_options, attitude_solution, flight_references
 from css_estimation.flight_references import FlightReferences
 from css_estimation.messages import attitude_estimate_fields, cells_input, field_reading, gyro_reading
@@ -25,15 +24,8 @@ class AttitudeFilter(Component):
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         return (
             cells_input(values),
-            Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), heeded=values.use_gyro),
-            Input(
-                "field",
-                "mag/field",
-                MagneticField,
-                required=False,
-                divider=values.magnetometer.divider,
-                used=("magnetic_field",),
-            ),
+            gyro_input(values),
+            field_input(values),
         )
 
     @classmethod

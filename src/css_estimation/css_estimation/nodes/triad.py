@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
-from sensor_msgs.msg import MagneticField
 
 from css_common.attitude import dcm_to_quaternion
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values, choice
+from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation import flight_references, sun_field_attitude
@@ -54,7 +54,7 @@ class Triad(Component):
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         return (
             Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle),
-            Input("field", "mag/field", MagneticField, divider=values.magnetometer.divider, used=("magnetic_field",)),
+            field_input(values, required=True),
         )
 
     @classmethod

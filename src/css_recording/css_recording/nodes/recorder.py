@@ -23,7 +23,7 @@ from css_recording.bag_metadata import absolute
 from css_recording.errors import BagError
 from css_recording.process import RosArgumentsError, ros_process, split_arguments
 from css_recording.qos_overrides import read_qos_overrides
-from css_recording.recorder import INCIDENTS, RecorderNode
+from css_recording.recorder import RecorderNode
 from css_recording.recording_choice import Excluded, RecordingChoice
 from css_recording.split_bag_writer import FileLimits
 
@@ -103,7 +103,7 @@ def _record(
         spin_until(executor, lambda: stop.came or bool(node.failure))
         _drain(executor, node)
     finally:
-        node.close(_notes(options.notes, node))
+        node.close(_incidents(options.notes))
         missing = _say(parser, options, node, folder)
         retire(executor, node)
     return missing
@@ -120,13 +120,12 @@ def _drain(executor: Executor, node: RecorderNode) -> None:
             executor.spin_once(timeout_sec=_QUIET_S / 10)
 
 
-def _notes(file: str | None, node: RecorderNode) -> dict[str, str]:
-    """What the flight was like, as its supervisor left it, and what the recorder itself lacks."""
-    lines = node.faults()
+def _incidents(file: str | None) -> list[str]:
+    """What the flight was like, as its supervisor left it."""
     if file is not None:
         with suppress(OSError, ValueError):  # a supervisor that died leaves none, or half of one
-            lines = [*json.loads(Path(file).read_text(encoding="utf-8")), *lines]
-    return {INCIDENTS: "\n".join(lines) or "none"}
+            return json.loads(Path(file).read_text(encoding="utf-8"))
+    return []
 
 
 def _say(parser: CommandParser, options: argparse.Namespace, node: RecorderNode, folder: Path) -> list[str]:

@@ -14,9 +14,9 @@ from css_common.kernel import study_hash
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_studies.direct_flight import configured
+from css_studies.monte_carlo import chunk
 from css_studies.monte_carlo.case_figures import SAMPLED
 from css_studies.monte_carlo.case_table import FIGURES
-from css_studies.monte_carlo import chunk
 from css_studies.monte_carlo.chunk import ChunkTask
 from css_studies.monte_carlo.percentiles import over_cases
 from css_studies.monte_carlo.schedulers import Scheduler, ThreadScheduler

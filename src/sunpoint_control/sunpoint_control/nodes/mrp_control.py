@@ -4,13 +4,13 @@
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from sensor_msgs.msg import MagneticField
 
 from css_common.component import Component, Finding, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sensor_inputs import field_input
 from css_common.vectors import vector_of
 from css_msgs.msg import ControlStatus, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand
 from sunpoint_control import sun_pointing_control as control
@@ -44,16 +44,7 @@ class MrpControl(Component):
             ),
         ]
         if values.rods.fitted:
-            inputs.append(
-                Input(
-                    "field",
-                    "mag/field",
-                    MagneticField,
-                    required=False,
-                    divider=values.magnetometer.divider,
-                    used=("magnetic_field",),
-                )
-            )
+            inputs.append(field_input(values))
         return tuple(inputs)
 
     @classmethod
