@@ -15,8 +15,8 @@ import numpy as np
 from rclpy.node import Node
 
 from css_bringup.composed import ComposedFlight
-from css_bringup.flight import FlightResult
-from css_bringup.flying import own_domain
+from css_bringup.flight_result import FlightResult
+from css_bringup.fly_mission import own_domain
 from css_bringup.options import console
 from css_bringup.processes import Supervisor, fly_processes
 from css_common.codec import codec_of

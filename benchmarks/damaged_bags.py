@@ -25,8 +25,8 @@ from bag_damage import DAMAGES
 from rosbags.rosbag2 import StoragePlugin
 from rosbags.rosbag2 import Writer as RosbagsWriter
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import mission_of_bag, replay
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_common.mission_file import MissionError
 from css_recording.bag_reader import BagReader
 from css_recording.bag_storage import NO_CHECK_SUM

@@ -29,7 +29,7 @@ from css_common.mission import Mission, find_component, mission_from_text
 from css_common.mission_file import MissionError, dump_sections, flattened, read_sections, read_text
 from css_common.node_arguments import mission_of_arguments
 from css_common.schema import ParameterError
-from css_studies.direct_flight import fly_and_keep
+from css_monte_carlo.direct_flight import fly_and_keep
 
 ROOT = Path(__file__).resolve().parents[1]
 LIMIT = 2.0  # [s] wall time of reading one

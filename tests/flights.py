@@ -5,7 +5,7 @@ from collections import defaultdict
 from pathlib import Path
 
 from css_bringup.composed import ComposedFlight
-from css_bringup.flight import FlightResult
+from css_bringup.flight_result import FlightResult
 from css_common.codec import Sample, codec_of
 from css_common.mission import Mission, load_mission
 from css_recording.bag_reader import BagReader

@@ -6,7 +6,7 @@ import math
 import numpy as np
 
 from css_common.kernel import kernel
-from css_estimation.cell_layout import sees
+from css_estimation.sun.cell_layout import sees
 
 POLAR = (np.arange(720) + 0.5) * math.pi / 720
 AZIMUTH = (np.arange(1440) + 0.5) * 2.0 * math.pi / 1440

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from flights import fly_composed, short_mission
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import mission_of_bag, replay
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 
 REFERENCE = Path(__file__).parents[1] / "bags" / "reference"
 NUMBERS = REFERENCE / "expected.json"

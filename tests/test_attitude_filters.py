@@ -4,13 +4,13 @@
 import pytest
 from flights import fly_composed, messages_by_topic
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import mission_of_bag, replay
+from css_analysis.flight_figures import write_figures
+from css_analysis.flight_metrics import estimator_runs
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_bringup.report import unmet
 from css_common.mission import load_mission
-from css_studies.direct_flight import fly_directly
-from css_studies.flight_figures import write_figures
-from css_studies.flight_metrics import estimator_runs
+from css_monte_carlo.direct_flight import fly_directly
 
 NAMES = ("attitude_vector", "attitude_voltage")
 

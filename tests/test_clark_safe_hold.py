@@ -6,15 +6,15 @@ import pytest
 from flights import fly_composed
 from scipy.spatial.transform import Rotation
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import mission_of_bag, replay
+from css_analysis.flight_log import read_flight
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_common.mission import load_mission
-from css_estimation.safe_hold import MODE_FLAT, MODE_NO_SUN, MODE_PYRAMID, MODE_PYRAMID_DENIED, MODE_SHADOW
-from css_studies.direct_flight import fly_directly
-from css_studies.flight_log import read_flight
-from css_studies.monte_carlo.case_table import case_table
-from css_studies.monte_carlo.chunk import fly_cases
-from css_studies.monte_carlo.mission_flight import MissionFlight
+from css_estimation.sun.safe_hold import MODE_FLAT, MODE_NO_SUN, MODE_PYRAMID, MODE_PYRAMID_DENIED, MODE_SHADOW
+from css_monte_carlo.case_table import case_table
+from css_monte_carlo.chunk import fly_cases
+from css_monte_carlo.direct_flight import fly_directly
+from css_monte_carlo.mission_flight import MissionFlight
 
 CASES = np.arange(6)
 TWO_ORBITS = "mission.duration=11290"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from spinning import STEADY, motion_of, record_of, sun_angles, sun_over_andoya
 
-from css_estimation.coning import (
+from css_estimation.spin.coning import (
     CHOICE_EVENTS,
     CHOICE_INERTIA,
     CHOICE_ONLY,
@@ -15,9 +15,9 @@ from css_estimation.coning import (
     analyse_coning,
     justification,
 )
-from css_estimation.coning_angle import extremum_differences, fit_sine, max_min_angle
-from css_estimation.coning_spectrum import alias_frequencies, fourier_spectrum, peak_frequency, sequence_numbers
-from css_estimation.slit_angles import motion_gain
+from css_estimation.spin.coning_angle import extremum_differences, fit_sine, max_min_angle
+from css_estimation.spin.coning_spectrum import alias_frequencies, fourier_spectrum, peak_frequency, sequence_numbers
+from css_estimation.spin.slit_angles import motion_gain
 from css_sim.spinning_payload import inertia_ratio
 
 SUN_N = sun_over_andoya()
@@ -85,7 +85,7 @@ def test_a_ratio_between_two_candidates_leaves_the_choice_to_the_pulses(up_leg):
 
 
 def test_what_nothing_tells_apart_is_ambiguous_and_its_rivals_are_named(up_leg, monkeypatch):
-    monkeypatch.setattr("css_estimation.coning.fit_motion", lambda *arguments: None)
+    monkeypatch.setattr("css_estimation.spin.coning.fit_motion", lambda *arguments: None)
     passages = up_leg.passages.between(0.0, 40.0)
     near = analyse_coning(passages, INCLINATION, 0.72)
     assert (near.choice, near.chosen, near.rivals) == (CHOICE_INERTIA, 1, ())

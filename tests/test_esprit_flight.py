@@ -5,16 +5,16 @@ import numpy as np
 import pytest
 from flights import fly_composed, messages_by_topic, samples
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import replay
+from css_analysis.estimate_errors import attitude_errors
+from css_analysis.flight_log import read_flight
+from css_analysis.spin_flight import read_spinning
+from css_analysis.spin_summary import spin_lines, spin_object
+from css_bringup.replay_bag import replay
+from css_bringup.replay_pass import parse_request
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
+from css_monte_carlo.direct_flight import fly_and_keep
 from css_msgs.msg import AttitudeEstimate, SlitPulse, SlitPulses, SlitSunAngle
-from css_studies.direct_flight import fly_and_keep
-from css_studies.estimate_errors import attitude_errors
-from css_studies.flight_log import read_flight
-from css_studies.spin_flight import read_spinning
-from css_studies.spin_summary import spin_lines, spin_object
 
 SENSORS_ALONE = """
 /**:

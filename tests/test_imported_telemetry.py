@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from flights import samples
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import mission_of_bag, replay
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_msgs.msg import SpacecraftState, SunEstimate
 from css_recording.commands.import_csv import main
 

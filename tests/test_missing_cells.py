@@ -9,15 +9,15 @@ import pytest
 from faces import FACES, LINES, recording
 from flights import fly_composed, samples
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import ReplayResult, mission_of_bag, replay
+from css_analysis.estimate_errors import attitude_errors, heading_errors, tangent_nees
+from css_bringup.replay_bag import ReplayResult, mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_common.codec import codec_of
 from css_common.mission import load_mission
 from css_msgs.msg import AttitudeEstimate, CssVoltages, SunEstimate
 from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
-from css_studies.estimate_errors import attitude_errors, heading_errors, tangent_nees
 
 
 def replayed(bag: Path, *requests: str) -> ReplayResult:

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from flights import fly_composed
 
+from css_analysis.flight_log import read_flight
 from css_common.mission import find_mission, load_mission, mission_from_text
+from css_monte_carlo.chunk import fly_cases
+from css_monte_carlo.direct_flight import configured
+from css_monte_carlo.mission_flight import MissionFlight
 from css_msgs.msg import SunEstimate
-from css_studies.direct_flight import configured
-from css_studies.flight_log import read_flight
-from css_studies.monte_carlo.chunk import fly_cases
-from css_studies.monte_carlo.mission_flight import MissionFlight
 
 EVENTS = """
     events:

@@ -15,12 +15,13 @@ from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_common.node_process import run_node
 from css_common.preflight import preflight
+from css_monte_carlo.commands import monte_carlo
+from css_monte_carlo.direct_flight import fly_directly
+from css_monte_carlo.study import Configuration, run_study
+from css_monte_carlo.study_folder import StudyError
+from css_papers.okeefe.configurations import AS_PRINTED, IMPROVED
 from css_sim.flight_checks import FASTEST, MotionError, check_rate
 from css_sim.nodes.dynamics import Dynamics
-from css_studies.commands import monte_carlo
-from css_studies.direct_flight import fly_directly
-from css_studies.monte_carlo import Configuration, StudyError, run_study
-from css_studies.reproduce.okeefe.configurations import AS_PRINTED, IMPROVED
 
 MISSIONS = ("okeefe_2013", "clark_1996_flat", "clark_1996_pyramid", "cubesat_vmm", "esprit_2006")
 UNSTABLE = "mrp_control.gains.p=5000"
@@ -143,7 +144,7 @@ PURE = (
 
 @pytest.mark.parametrize("cutoff", ["0.1", "1000"])
 def test_gains_fly_below_the_limit_and_swing_between_torque_limits_above(cutoff, monkeypatch):
-    monkeypatch.setattr("css_studies.direct_flight.preflight", lambda mission: [])
+    monkeypatch.setattr("css_monte_carlo.direct_flight.preflight", lambda mission: [])
     mission = short_mission(60.0, *PURE, f"ekf.rate.cutoff={cutoff}")
     with pytest.raises(MissionError) as refusal:
         preflight(mission.with_overrides(["mrp_control.gains.p=5000"]))

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from bootstrap.verbs import VERBS
+from css_analysis.commands import slit_analyse
 from css_bringup.commands import fly, replay
-from css_bringup.replaying import default_replay
+from css_bringup.replay_bag import default_replay
 from css_common.command import USAGE
 from css_recording.commands import import_csv
-from css_studies.commands import slit_analyse
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("src/*/README.md"), *ROOT.glob("b*/README.md"))

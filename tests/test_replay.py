@@ -11,8 +11,8 @@ from flights import fly_composed, messages_by_topic, samples, short_mission
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from css_bringup.replay import parse_request
-from css_bringup.replaying import mission_of_bag, replay
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_common.codec import codec_of
 from css_common.mission_file import MissionError
 from css_msgs.msg import CssVoltages, SunEstimate

@@ -12,8 +12,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from css_bringup.composed import ComposedFlight
-from css_bringup.replay import parse_request
-from css_bringup.replaying import ReplayResult, mission_of_bag, replay
+from css_bringup.replay_bag import ReplayResult, mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_common.mission import Mission, find_mission, mission_from_text
 from css_msgs.msg import SunEstimate
 

@@ -57,7 +57,12 @@ def test_node_explains_itself(package, executable):
     assert len(_help(package, executable).splitlines()) > 5
 
 
-SOME = [("css_estimation", "ekf"), ("css_recording", "recorder"), ("css_bringup", "fly"), ("css_studies", "coverage")]
+SOME = [
+    ("css_estimation", "ekf"),
+    ("css_recording", "recorder"),
+    ("css_bringup", "fly"),
+    ("css_monte_carlo", "coverage"),
+]
 
 
 @pytest.mark.parametrize(("package", "executable"), SOME)

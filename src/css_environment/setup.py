@@ -1,30 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Build rules: every file in `nodes/` and `commands/` becomes an executable of its name."""
+"""Build rules: see `css_common.packaging`."""
 
-from pathlib import Path
+from css_common.packaging import ros_package
 
-from setuptools import find_packages, setup
-
-PACKAGE = "css_environment"
-EXECUTABLES = [
-    f"{file.stem} = css_common.entry:main"
-    for folder in ("nodes", "commands")
-    for file in sorted(Path(PACKAGE, folder).glob("[a-z]*.py"))
-]
-
-setup(
-    name=PACKAGE,
-    version="0.1.0",
-    packages=find_packages(exclude=["test"]),
-    package_data={PACKAGE: ["data/*"]},
-    data_files=[
-        ("share/ament_index/resource_index/packages", [f"resource/{PACKAGE}"]),
-        (f"share/{PACKAGE}", ["package.xml"]),
-    ],
-    entry_points={"console_scripts": EXECUTABLES},
-    zip_safe=False,
-    maintainer="Sunpoint maintainers",
-    maintainer_email="maintainers@sunpoint.dev",
-    description="Orbit, Sun, Earth rotation, eclipse, magnetic field and albedo.",
-    license="Apache-2.0",
-)
+ros_package(__file__)

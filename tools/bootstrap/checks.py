@@ -9,7 +9,7 @@ from collections.abc import Mapping
 
 from bootstrap.project import Project
 
-LINTERS = (["ruff", "check"], ["mypy"])
+LINTERS = (["ruff", "check"], ["ruff", "format", "--check"], ["mypy"])
 
 
 def failing_linters(project: Project, env: Mapping[str, str]) -> list[str]:

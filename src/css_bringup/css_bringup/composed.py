@@ -8,7 +8,7 @@ from pathlib import Path
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
 
-from css_bringup.flight import FlightResult, Progress, Stopped, as_flown
+from css_bringup.flight_result import FlightResult, Progress, Stopped, as_flown
 from css_bringup.incidents import node_incidents
 from css_common.executor import create_executor, retire, spin_until
 from css_common.host import ComponentNode

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from css_analysis.readable_table import ReadableTable
 from css_bringup.basilisk import LARGEST_ERROR_DEG, Basilisk
 from css_bringup.basilisk_scenario import basilisk_scenario, write_zonal_earth
 from css_bringup.json_process import MeasurementError, number, run_for_object
@@ -25,7 +26,6 @@ from css_bringup.processes import executable_path
 from css_bringup.report import print_json
 from css_common import places
 from css_common.mission import load_mission
-from css_studies.readable_table import ReadableTable
 
 MISSION = "okeefe_2013"
 KINDS = {"albedo": True, "no_albedo": False}
@@ -67,7 +67,7 @@ def run(arguments: argparse.Namespace) -> None:
         MeasurementError: one side cannot be measured, or its flights are no good.
     """
     mission = load_mission(MISSION, [f"mission.duration={arguments.duration}"])
-    monte_carlo = executable_path("css_studies", "monte_carlo")
+    monte_carlo = executable_path("css_monte_carlo", "monte_carlo")
     basilisk = Basilisk(places.home().absolute())
     if not basilisk.installed:
         with console.status(f"installing Basilisk {basilisk.version} in {basilisk.folder} (130 MB to download, once)"):
@@ -122,9 +122,7 @@ def our_measurement(result: Mapping[str, Any]) -> Measurement:
         raise MeasurementError(f"{_OURS}: no flight reaches the Sun; give a longer --duration")
     error = number(_OURS, configurations[0], "heading_error_mean_deg")
     if ns <= 0.0 or error > LARGEST_ERROR_DEG:
-        raise MeasurementError(
-            f"{_OURS}: {ns:g} ns a step with a mean heading error of {error:.1f} deg mean nothing"
-        )
+        raise MeasurementError(f"{_OURS}: {ns:g} ns a step with a mean heading error of {error:.1f} deg mean nothing")
     return Measurement(ns, error)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
+from css_analysis.flight_metrics import QUANTITIES
 from css_common import command
 from css_common.domains import DomainError
 from css_common.mission import SHARED, Mission, load_mission
@@ -15,7 +16,6 @@ from css_common.mission_file import MissionError
 from css_common.network import NetworkError
 from css_common.schema import unknown_name
 from css_recording.errors import BagError
-from css_studies.flight_metrics import QUANTITIES
 
 # without markup: units, paths and what people type may hold brackets
 console = Console(stderr=False, highlight=False, markup=False)

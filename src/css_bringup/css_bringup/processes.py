@@ -17,7 +17,7 @@ from typing import Any
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
 
 from css_bringup.child import Child
-from css_bringup.flight import FlightResult, Stopped, as_flown
+from css_bringup.flight_result import FlightResult, Stopped, as_flown
 from css_bringup.incidents import node_incidents
 from css_bringup.warden import Warden
 from css_common.mission import Mission

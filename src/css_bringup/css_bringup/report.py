@@ -8,12 +8,12 @@ from typing import Any
 
 from rich.console import Console
 
-from css_bringup.flight import FlightResult
+from css_analysis.flight_metrics import Run
+from css_analysis.flight_summary import Verdict, criteria_failures, criteria_verdicts, summary_table
+from css_bringup.flight_result import FlightResult
 from css_bringup.options import complain
 from css_common.mission import Mission
 from css_msgs.msg import ControlStatus
-from css_studies.flight_metrics import Run
-from css_studies.flight_summary import Verdict, criteria_failures, criteria_verdicts, summary_table
 
 
 def result_object(

@@ -54,7 +54,7 @@ print(json.dumps(dict(mission=sys.argv[1], cases=3, steps=10, cpu_ns_per_case_st
 
 @pytest.fixture
 def workspace(tmp_path, monkeypatch):
-    """A project folder and an installed css_studies, both of stand-ins; `calls` lists what was started."""
+    """A project folder and an installed css_monte_carlo, both of stand-ins; `calls` lists what was started."""
 
     class Workspace:
         home, calls_file = tmp_path / "project", tmp_path / "calls"
@@ -71,14 +71,14 @@ def workspace(tmp_path, monkeypatch):
 
         uv = home / ".venv" / "bin" / "uv"
         peer = home / "benchmarks" / "basilisk_flight.py"
-        monte_carlo = tmp_path / "prefix" / "lib" / "css_studies" / "monte_carlo"
+        monte_carlo = tmp_path / "prefix" / "lib" / "css_monte_carlo" / "monte_carlo"
 
     made = Workspace()
     made.write(made.uv, UV, 0o755)
     made.write(made.peer, PEER)
     made.write(made.monte_carlo, MONTE_CARLO, 0o755)
     made.write(made.home / "benchmarks" / "requirements-basilisk.lock", "bsk==2.12.1 \\\n    --hash=sha256:00\n")
-    made.write(tmp_path / "prefix" / "share" / "ament_index" / "resource_index" / "packages" / "css_studies", "")
+    made.write(tmp_path / "prefix" / "share" / "ament_index" / "resource_index" / "packages" / "css_monte_carlo", "")
     monkeypatch.setenv("SUNPOINT_HOME", str(made.home))
     monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path / 'prefix'}:{os.environ['AMENT_PREFIX_PATH']}")
     monkeypatch.chdir(ROOT)  # missions are found in config/ here
@@ -211,7 +211,7 @@ def test_a_missing_monte_carlo_and_a_missing_peer_are_one_line(workspace, capfd)
     assert "basilisk_flight.py" in error_line(capfd)
     workspace.monte_carlo.unlink()
     assert run() == USAGE
-    assert "css_studies has no executable monte_carlo" in error_line(capfd)
+    assert "css_monte_carlo has no executable monte_carlo" in error_line(capfd)
 
 
 @pytest.mark.parametrize("arguments", [["--duration", "0"], ["--duration", "nan"]])

@@ -8,19 +8,19 @@ from pathlib import Path
 
 import pytest
 
+from css_analysis.flight_log import read_flight
+from css_analysis.flight_metrics import QUANTITIES
 from css_bringup import options
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
-from css_bringup.flight import FlightResult, default_bag
+from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.processes import Child, Supervisor
-from css_bringup.replay import parse_request
+from css_bringup.replay_pass import parse_request
 from css_bringup.report import flight_object
 from css_common.command import FAILED, USAGE
 from css_common.mission import default_mission, load_mission
 from css_common.mission_file import MissionError
 from css_common.preflight import preflight
-from css_studies.flight_log import read_flight
-from css_studies.flight_metrics import QUANTITIES
 
 ROOT = Path(__file__).parents[3]
 WITHOUT_ESTIMATOR = "css_sim/dynamics,css_sim/css_array,sunpoint_control/mrp_control"

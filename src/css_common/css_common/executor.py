@@ -10,12 +10,13 @@ builds its wait set anew, which is what costs rclpy most of its time.
 import os
 from collections.abc import Callable
 
-from rclpy._rclpy_pybind11 import InvalidHandle, RCLError
 from rclpy.context import Context
 from rclpy.executors import Executor, ExternalShutdownException, SingleThreadedExecutor
 from rclpy.experimental.events_executor import EventsExecutor
 from rclpy.node import Node
 from rclpy.utilities import get_default_context
+
+from css_common.ros_internals import InvalidHandle, RCLError
 
 _CALLBACKS_BETWEEN_CHECKS = 64
 _MESSAGES_IN_A_ROW = 200

@@ -15,7 +15,6 @@ from functools import partial
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
-from rclpy._rclpy_pybind11 import RCLError
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
 from rclpy.duration import Duration
@@ -34,6 +33,7 @@ from css_common.matching import Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_common.rcl_errors import endpoint
+from css_common.ros_internals import RCLError
 from css_common.schema import ParameterError, Values
 from css_common.sole_subscription import SoleSubscription
 from css_common.stepping import Stepper, conflict

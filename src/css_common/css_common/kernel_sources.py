@@ -19,9 +19,11 @@ KERNEL_PACKAGES = (
     "css_sim",
     "css_estimation",
     "sunpoint_control",
-    "css_studies",
+    "css_analysis",
+    "css_monte_carlo",
+    "css_papers",
 )
-_CALLED_BY_TYPE = KERNEL_PACKAGES[:-1]  # nothing calls upwards
+_CALLED_BY_TYPE = KERNEL_PACKAGES[:5]  # nothing calls upwards
 
 # what stands at the beginning of a line: kernels are compiled with the names of their module
 _IMPORT = re.compile(r"^(?:from +([\w.]+) +import +(\([^)]*\)|.+)|import +(.+))$", re.MULTILINE)

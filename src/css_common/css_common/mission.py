@@ -340,9 +340,7 @@ class Mission:
                     )
         for topic in self.values.lockstep.wait_for:
             if topic not in publishers:
-                raise MissionError(
-                    f"{self.origin}: {SHARED}: lockstep.wait_for: {unknown_name(topic, publishers)}"
-                )
+                raise MissionError(f"{self.origin}: {SHARED}: lockstep.wait_for: {unknown_name(topic, publishers)}")
             name, output = publishers[topic]
             if output.events:
                 raise MissionError(

@@ -50,9 +50,7 @@ def _topic(port: Input | Output, values: Values, profile: QoSProfile, end: str) 
     yield f"      qos_overrides./{port.topic}.{end}.{{{','.join(OVERRIDABLE)}}}"
 
 
-def _examples(
-    component_type: type[Component], inputs: tuple[Input, ...], outputs: tuple[Output, ...]
-) -> Iterator[str]:
+def _examples(component_type: type[Component], inputs: tuple[Input, ...], outputs: tuple[Output, ...]) -> Iterator[str]:
     package, _, name = component_type.__module__.partition(".nodes.")
     end, port = ("subscription", inputs[0]) if inputs else ("publisher", outputs[0])
     override = f"qos_overrides./my/topic.{end}.reliability:=best_effort"

@@ -22,6 +22,7 @@ from css_common.node_help import describe
 from css_common.plant_host import PlantNode
 from css_common.preflight import preflight, report
 from css_common.rcl_errors import REFUSALS, explained, in_own_words
+from css_common.ros_internals import overrides_of
 from css_common.schema import ParameterError, nearest, shown
 from css_common.stop_signal import StopSignal
 from css_common.supervised import beat
@@ -156,7 +157,7 @@ class _Process:
 def _unused_overrides(node: ComponentNode) -> Iterator[str]:
     """Overrides of a quality of service that none of the node's topics has."""
     known = [name for name in node.get_parameters_by_prefix("") if name.startswith("qos_overrides.")]
-    for name in node._parameter_overrides:
+    for name in overrides_of(node):
         if name.startswith("qos_overrides.") and name not in known:
             near = nearest(name, known)
             yield f"{name}: no topic of this node has it" + (f"; did you mean {near}?" if near else "")

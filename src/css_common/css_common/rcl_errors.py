@@ -5,10 +5,10 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.logging import LoggingSeverity, get_logger_level, set_logger_level
 
+from css_common.ros_internals import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from css_common.schema import ParameterError
 
 REFUSALS = (RCLError, RCLInvalidROSArgsError, UnknownROSArgsError, NameValidationException, ParameterException)

@@ -11,6 +11,7 @@ from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValu
 from rclpy.node import Node
 from rclpy.parameter import Parameter as RosParameter
 
+from css_common.ros_internals import overrides_of
 from css_common.schema import Parameter, ParameterError, integer
 
 _TYPES = {
@@ -69,10 +70,10 @@ def declare(node: Node, table: Iterable[Parameter], canonical: Mapping[str, Any]
             if not node.has_parameter(p.name):
                 _declare(node, p, canonical[p.name])
         except (InvalidParameterTypeException, InvalidParameterValueException) as error:
-            p.check(_plain(p, node._parameter_overrides[p.name].value))  # says it in the words of a mission
+            p.check(_plain(p, overrides_of(node)[p.name].value))  # says it in the words of a mission
             raise ParameterError(f"{p.name}: expected {p.expectation()} ({error})") from error
         result[p.name] = p.check(_plain(p, node.get_parameter(p.name).value))
-    for name, given in node._parameter_overrides.items():
+    for name, given in overrides_of(node).items():
         if name.startswith("qos_overrides.") and name.endswith(".depth"):
             replace(_DEPTH, name=name).check(given.value)
     return result
@@ -88,7 +89,7 @@ def _declare(node: Node, p: Parameter, value: Any) -> None:
     open_to_change.read_only = False
     node.declare_parameter(p.name, _TYPES[p.kind], open_to_change)
     if node.get_parameter_or(p.name).value is None:
-        overridden = p.name in node._parameter_overrides
+        overridden = p.name in overrides_of(node)
         node.set_parameters([RosParameter(p.name, _TYPES[p.kind], [] if overridden else list(value))])
     descriptor = _descriptor(p)
     descriptor.type = _TYPES[p.kind].value

@@ -193,9 +193,7 @@ def real(
     tunable: bool = False,
 ) -> Parameter:
     """A number. `open_low` excludes the lower bound itself; `tunable` allows a change in flight."""
-    return Parameter(
-        name, "real", float(default), unit, description, low, high, open_low=open_low, tunable=tunable
-    )
+    return Parameter(name, "real", float(default), unit, description, low, high, open_low=open_low, tunable=tunable)
 
 
 def integer(
@@ -217,9 +215,7 @@ def flag(name: str, default: bool, description: str, *, tunable: bool = False) -
     return Parameter(name, "flag", default, "-", description, tunable=tunable)
 
 
-def choice(
-    name: str, default: str, choices: tuple[str, ...], description: str, *, tunable: bool = False
-) -> Parameter:
+def choice(name: str, default: str, choices: tuple[str, ...], description: str, *, tunable: bool = False) -> Parameter:
     """One of a few words."""
     return Parameter(name, "choice", default, "-", description, choices=choices, tunable=tunable)
 

@@ -6,8 +6,6 @@ as the middleware announces a second one, before anything of it is taken, the ex
 place of this subscription's, and messages are taken here, by a timer, with the GID of their writer, until there is
 one writer again. The same is done at the start, until it is known who the first one is.
 
-The names of rclpy that are not public stand in this file alone: `Node._subscriptions`, `Node._wake_executor`,
-`Subscription._Subscription__subscription`, `EventHandler._EventHandler__event` and `_rclpy.Subscription`.
 """
 
 import copy
@@ -15,10 +13,8 @@ from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
 
-from rclpy._rclpy_pybind11 import InvalidHandle
 from rclpy.clock import Clock, ClockType
 from rclpy.event_handler import QoSSubscriptionEventType, SubscriptionEventCallbacks
-from rclpy.impl.implementation_singleton import rclpy_implementation as _rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSCompatibility, QoSProfile, qos_check_compatible
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -29,6 +25,15 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from css_common.edge import HISTORY
 from css_common.qos import matching_qos
 from css_common.raw_take import take_with_writer
+from css_common.ros_internals import (
+    InvalidHandle,
+    bare_subscription,
+    event_of,
+    overrides_of,
+    show_executor,
+    subscriptions_of,
+    wake_executor_of,
+)
 from css_common.writers import Writer, WriterChoice
 
 _TAKE_EVERY = 0.001
@@ -124,7 +129,7 @@ class SoleSubscription:
         self._handle = subscription.handle
         self._hear_of_writers_at_once(subscription)
         # not yet the executor's: nothing is taken before its writer is known
-        self._node._subscriptions.remove(subscription)
+        subscriptions_of(self._node).remove(subscription)
         return subscription
 
     # Writers that come and go
@@ -147,7 +152,7 @@ class SoleSubscription:
             return taken
 
         def look_when_matched() -> None:
-            event = handler._EventHandler__event
+            event = event_of(handler)
             with event:
                 status = event.take_event()
             counts = (status.total_count, status.current_count) if status is not None else self._matched
@@ -257,31 +262,24 @@ class SoleSubscription:
     # The executor's share
 
     def _give_to_executor(self) -> None:
-        self._show_executor(self._handle)
-        if self._subscription not in self._node._subscriptions:
-            self._node._subscriptions.append(self._subscription)
-            self._node._wake_executor()
+        show_executor(self._subscription, self._handle)
+        if self._subscription not in subscriptions_of(self._node):
+            subscriptions_of(self._node).append(self._subscription)
+            wake_executor_of(self._node)
 
     def _take_from_executor(self) -> None:
-        if self._subscription not in self._node._subscriptions:
+        if self._subscription not in subscriptions_of(self._node):
             return  # it was never the executor's
         if self._nobody is None:
-            with self._node.handle:
-                # a topic of one type has no reader of another, so each has a name of its own
-                nobodys = f"{_NOBODYS_TOPIC}{self.topic}"
-                self._nobody = _rclpy.Subscription(
-                    self._node.handle, self._type, nobodys, self._qos.get_c_qos_profile()
-                )
-        self._show_executor(self._nobody)
-
-    def _show_executor(self, handle: Any) -> None:
-        self._subscription._Subscription__subscription = handle  # type: ignore[attr-defined]
+            # a topic of one type has no reader of another, so each has a name of its own
+            self._nobody = bare_subscription(self._node, self._type, f"{_NOBODYS_TOPIC}{self.topic}", self._qos)
+        show_executor(self._subscription, self._nobody)
 
     # Quality of service
 
     def _has_override(self) -> bool:
         prefix = f"qos_overrides.{self.topic}.subscription."
-        return any(name.startswith(prefix) for name in self._node._parameter_overrides)
+        return any(name.startswith(prefix) for name in overrides_of(self._node))
 
     def _on_incompatible(self, _: object) -> None:
         """Makes do with what the writer offers, unless somebody is heard already or parameters say otherwise."""

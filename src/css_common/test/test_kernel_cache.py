@@ -142,7 +142,7 @@ def test_a_loop_is_made_from_every_kernel_that_it_may_be_handed(project):
 
 
 def test_imports_are_followed_as_python_writes_them():
-    sources = {source.stem for source in sources_of("css_estimation.sunline_ekf")}
+    sources = {source.stem for source in sources_of("css_estimation.sun.sunline_ekf")}
     assert {"sunline_ekf", "vectors", "attitude", "low_pass", "kernel"} <= sources
     assert not {"wls", "numpy", "typing", "mission"} & sources
     assert {source.stem for source in kernel_modules()} >= {

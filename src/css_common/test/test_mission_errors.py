@@ -115,7 +115,7 @@ SHARED_ERRORS = {
     "use_sim_time: 3": "bench.yaml: /**: use_sim_time: 3 given, expected true or false",
     "mission.seed: " + "9" * 5000: "/**: mission.seed: '99999999",
     "mission.seed: " + "9" * 19: "/**: mission.seed: 1e+19 given, expected a whole number",
-    "mission.description: \"a\\eb\"": "description: 'a\\x1bb' given, expected one line without control characters",
+    'mission.description: "a\\eb"': "description: 'a\\x1bb' given, expected one line without control characters",
     "io: {deadline: [0.5]}": "bench.yaml: /**: io.deadline: [0.5] given",
     "io: {deadline: {x: 0.5}}": "bench.yaml: /**: io.deadline.x: unknown; did you mean io.deadline?",
     "io: {body_frame: off}": "bench.yaml: /**: io.body_frame: False given, expected a text",
@@ -396,9 +396,7 @@ def test_what_is_no_name_is_made_one(text, name):
 def test_flight_that_ends_within_a_step_says_so():
     assert mission_from_text(HEAD, "bench.yaml").remarks == ()
     (remark,) = mission_from_text(HEAD, "bench.yaml", ["mission.duration=1.26"]).remarks
-    assert remark == (
-        "mission.duration: 1.26 s is no multiple of mission.period 0.1 s: 13 steps are flown, 1.3 s"
-    )
+    assert remark == ("mission.duration: 1.26 s is no multiple of mission.period 0.1 s: 13 steps are flown, 1.3 s")
 
 
 def shared_lines(form: str, count: int) -> str:

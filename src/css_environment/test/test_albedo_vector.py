@@ -89,9 +89,9 @@ def test_scale_with_flux_and_reflectivity_of_the_place():
         assert magnitude == pytest.approx(0.97 * ratio2 * reflectivity_at(table, up), rel=1e-6)
         p2 = (3.0 * math.sin(a) ** 2 - 1.0) / 2.0
         season = math.cos(2.0 * math.pi * (2_450_240.5 - 2_444_960.5) / 365.25)
-        assert reflectivity_at(table, up) == pytest.approx(
-            0.34 + 0.10 * season * math.sin(a) + 0.29 * p2, abs=2e-3
-        ), "interpolated between bands of 5 deg"
+        assert reflectivity_at(table, up) == pytest.approx(0.34 + 0.10 * season * math.sin(a) + 0.29 * p2, abs=2e-3), (
+            "interpolated between bands of 5 deg"
+        )
 
 
 def test_reflectivity_is_continuous_across_bands_and_constant_beyond_the_last():

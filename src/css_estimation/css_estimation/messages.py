@@ -12,9 +12,9 @@ from css_common.kernel import typed_call
 from css_common.readings import Readings
 from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
-from css_estimation.attitude_solution import VALIDITY_NONE, AttitudeSolution
-from css_estimation.error_covariance import CALIBRATION
-from css_estimation.sun_heading import SunHeading
+from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeSolution
+from css_estimation.sun.error_covariance import CALIBRATION
+from css_estimation.sun.sun_heading import SunHeading
 from css_msgs.msg import CssVoltages
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)

@@ -9,7 +9,7 @@ import yaml
 
 from css_common.schema import default_values
 from css_common.sections import CELLS, SPACECRAFT
-from css_estimation import flat_cells, pyramid_switch
+from css_estimation.sun import flat_cells, pyramid_switch
 
 CONFIG = Path(__file__).parents[3] / "config"
 SHARED = CELLS + SPACECRAFT

@@ -8,7 +8,7 @@ from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
 from css_common.schema import default_values
-from css_estimation.flight_references import FlightReferences
+from css_estimation.attitude.flight_references import FlightReferences
 from css_estimation.messages import field_reading
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_msgs.msg import AttitudeEstimate, CssVoltages

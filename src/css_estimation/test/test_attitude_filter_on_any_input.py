@@ -9,7 +9,7 @@ from attitude_scene import SUN_N, Run, Scene, options
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from css_estimation.attitude_solution import (
+from css_estimation.attitude.attitude_solution import (
     MODE_LOST,
     MODE_PROPAGATING,
     MODE_STARTED,
@@ -19,7 +19,7 @@ from css_estimation.attitude_solution import (
     VALIDITY_NONE,
     VALIDITY_VALID,
 )
-from css_estimation.flight_references import References
+from css_estimation.attitude.flight_references import References
 
 MODELS = pytest.mark.parametrize("model", ["vector", "voltage"])
 
@@ -61,9 +61,7 @@ def test_any_sequence(changes, cycles):
     scene = Scene(3)
     fly(scene, run, 5)
     for voltages, gyro, field_b, dt, sunlit, valid in cycles:
-        run.step(
-            scene, dt, voltages=np.array(voltages), gyro=gyro, field=field_b, sunlit=sunlit, valid=valid
-        )
+        run.step(scene, dt, voltages=np.array(voltages), gyro=gyro, field=field_b, sunlit=sunlit, valid=valid)
 
 
 @MODELS
@@ -177,5 +175,3 @@ def test_without_gyro_the_last_rate_is_held_and_the_filter_knows_less(model):
     assert run.sigma_deg > before
     fly(scene, run, 100)
     assert run.error_deg(scene) < 2.0
-
-

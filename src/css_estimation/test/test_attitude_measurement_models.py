@@ -10,12 +10,12 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import multiply
-from css_estimation import attitude_options, flight_references
-from css_estimation.cell_calibration import SCALE, TILT_1, TILT_2, nominal
-from css_estimation.cell_voltages import cell_measurement
-from css_estimation.direction_measurement import normalised_innovation
-from css_estimation.field_direction import field_measurement
-from css_estimation.lit_sun_vector import lit_sun, sun_vector_measurement
+from css_estimation.attitude import attitude_options, flight_references
+from css_estimation.attitude.cell_voltages import cell_measurement
+from css_estimation.attitude.direction_measurement import normalised_innovation
+from css_estimation.attitude.field_direction import field_measurement
+from css_estimation.attitude.lit_sun_vector import lit_sun, sun_vector_measurement
+from css_estimation.sun.cell_calibration import SCALE, TILT_1, TILT_2, nominal
 
 rng = np.random.default_rng(5)
 FACES = [1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0]

@@ -4,9 +4,9 @@
 import pytest
 
 from css_common.schema import default_values
-from css_estimation import eclipse_detector
-from css_estimation.eclipse_detector import detect_eclipse, initial_state
-from css_estimation.sun_heading import (
+from css_estimation.sun import eclipse_detector
+from css_estimation.sun.eclipse_detector import detect_eclipse, initial_state
+from css_estimation.sun.sun_heading import (
     ECLIPSE_ECLIPSED,
     ECLIPSE_SUNLIT,
     PREDICTION_ECLIPSED,

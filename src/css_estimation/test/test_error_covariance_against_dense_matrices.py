@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_estimation.error_covariance import (
+from css_estimation.sun.error_covariance import (
     CORRECTION,
     Partials,
     attitude_block,

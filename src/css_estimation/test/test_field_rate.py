@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.vectors import cross, dot, multiply, scale, subtract
-from css_estimation.field_rate import FieldChange, rate_about_sun
-from css_estimation.sun_heading import (
+from css_estimation.sun.field_rate import FieldChange, rate_about_sun
+from css_estimation.sun.sun_heading import (
     PREDICTION_ECLIPSED,
     PREDICTION_SUNLIT,
     RATE_FIELD,
@@ -68,9 +68,7 @@ class Flight:
     def step(self, omega=OMEGA, measured=True, dark=False, gyro=False, field_b=None):
         self.sun_b, self.field_b = turned(self.sun_b, omega, DT), turned(self.field_b, omega, DT)
         light = np.zeros(14) if dark else outputs(self.sun_b)
-        aiding = UNAIDED._replace(
-            gyro_b=omega, gyro_valid=gyro, field_b=field_b or self.field_b, field_valid=measured
-        )
+        aiding = UNAIDED._replace(gyro_b=omega, gyro_valid=gyro, field_b=field_b or self.field_b, field_valid=measured)
         predicted = PREDICTION_ECLIPSED if dark else PREDICTION_SUNLIT
         self.state, heading = SWITCH.step(self.p, self.state, DT, light, aiding, predicted)
         return heading

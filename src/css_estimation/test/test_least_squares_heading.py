@@ -14,10 +14,10 @@ from css_common.kernel import outer_kernel
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
-from css_estimation import least_squares as wls
-from css_estimation.cell_layout import brightest
-from css_estimation.snapshot import MODE_NO_SUN
-from css_estimation.sun_heading import NO_COVARIANCE
+from css_estimation.sun import least_squares as wls
+from css_estimation.sun.cell_layout import brightest
+from css_estimation.sun.snapshot import MODE_NO_SUN
+from css_estimation.sun.sun_heading import NO_COVARIANCE
 
 OPEN = {"cells__clip_normal": [0.0, 0.0, 0.0]}
 R = math.sqrt(0.5)

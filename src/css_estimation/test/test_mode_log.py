@@ -6,8 +6,8 @@ from clark_light import NORMALS, PANEL, off_panel, outputs
 
 from css_common.codec import codec_of
 from css_common.schema import checked_values, shaped_values
-from css_estimation.mode_log import ModeLog
 from css_estimation.nodes.pyramid_switch import PyramidSwitch
+from css_estimation.sun.mode_log import ModeLog
 from css_msgs.msg import CssVoltages
 
 S = 1_000_000_000

@@ -10,16 +10,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_common.schema import default_values
-from css_estimation.flat_faces import flat_heading
-from css_estimation.pyramid_switch import pyramid_heading
-from css_estimation.safe_hold import (
+from css_estimation.sun.flat_faces import flat_heading
+from css_estimation.sun.pyramid_switch import pyramid_heading
+from css_estimation.sun.safe_hold import (
     MODE_FLAT,
     MODE_NO_SUN,
     MODE_PYRAMID,
     MODE_PYRAMID_DENIED,
     MODE_SHADOW,
 )
-from css_estimation.sun_heading import (
+from css_estimation.sun.sun_heading import (
     ECLIPSE_ECLIPSED,
     ECLIPSE_SUNLIT,
     PREDICTION_ECLIPSED,

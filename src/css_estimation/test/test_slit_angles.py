@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from css_estimation.slit_angles import (
+from css_estimation.spin.slit_angles import (
     arc_slope,
     counting_variance,
     motion_gain,

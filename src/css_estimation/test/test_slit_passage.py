@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from css_common.schema import default_values
 from css_common.sections import SLITS
-from css_estimation import slit_measurement
-from css_estimation.slit_passage import (
+from css_estimation.spin import slit_measurement
+from css_estimation.spin.slit_passage import (
     LOWER,
     REASON_COUNT,
     REASON_DOUBLE,
@@ -25,7 +25,7 @@ from css_estimation.slit_passage import (
     UPPER,
     VERTICAL,
 )
-from css_estimation.slit_record import read_record
+from css_estimation.spin.slit_record import read_record
 
 PARAMETERS = slit_measurement.parameters(default_values((*SLITS, *slit_measurement.PARAMETERS)))
 TURN = 180_000

@@ -13,7 +13,7 @@ from css_estimation.messages import gyro_reading
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.nodes.wavg import Wavg
 from css_estimation.nodes.wls import Wls
-from css_estimation.sun_heading import RATE_FIELD, RATE_GYRO, RATE_SUN
+from css_estimation.sun.sun_heading import RATE_FIELD, RATE_GYRO, RATE_SUN
 from css_msgs.msg import CssVoltages, SunEstimate
 
 KINDS = pytest.mark.parametrize("kind", [Wavg, Wls, Ekf])
@@ -44,9 +44,7 @@ def field_of(stamp_ns, off=False):
     covariance = np.zeros(9)
     covariance[0] = -1.0 if off else 1e-15
     field_b = np.array([3e-5, -1e-5, 0.0])
-    return codec_of(MagneticField).sample(
-        stamp_ns, "bus", magnetic_field=field_b, magnetic_field_covariance=covariance
-    )
+    return codec_of(MagneticField).sample(stamp_ns, "bus", magnetic_field=field_b, magnetic_field_covariance=covariance)
 
 
 def run(component, steps, start=0, off=False, voltages=LIT):

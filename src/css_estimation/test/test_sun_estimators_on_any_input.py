@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from css_common.schema import default_values
 from css_common.sections import CELLS
-from css_estimation import least_squares, sunline_ekf, wavg
-from css_estimation.sun_heading import UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
+from css_estimation.sun import least_squares, sunline_ekf, wavg
+from css_estimation.sun.sun_heading import UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
 
 ESTIMATORS = pytest.mark.parametrize(
     ("estimator", "options"),

@@ -11,8 +11,8 @@ from scipy.signal import lti, step
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.vectors import cross, dot, multiply, norm, scale, subtract, unit
-from css_estimation.low_pass import low_pass, low_pass_gain
-from css_estimation.sun_rate import rate_from_sun_vectors
+from css_estimation.sun.low_pass import low_pass, low_pass_gain
+from css_estimation.sun.sun_rate import rate_from_sun_vectors
 
 LIMIT = math.radians(10.0)
 component = st.floats(-1.0, 1.0)

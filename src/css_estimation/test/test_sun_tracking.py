@@ -10,8 +10,8 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between, cross, multiply, norm, scale, subtract
-from css_estimation import sunline_ekf, wavg
-from css_estimation.sun_heading import (
+from css_estimation.sun import sunline_ekf, wavg
+from css_estimation.sun.sun_heading import (
     RATE_GYRO,
     RATE_NONE,
     RATE_SUN,

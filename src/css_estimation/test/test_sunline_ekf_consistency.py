@@ -17,8 +17,8 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between, multiply, scale
-from css_estimation import sunline_ekf
-from css_estimation.sun_heading import UNAIDED
+from css_estimation.sun import sunline_ekf
+from css_estimation.sun.sun_heading import UNAIDED
 
 RUNS = 60
 STEPS = 300

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from css_common.schema import default_values
 from css_common.sections import CELLS
-from css_estimation import sunline_ekf
-from css_estimation.sunline_filter import constrain, propagate, update_cell
+from css_estimation.sun import sunline_ekf
+from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.symmetric import congruence, product, row_major
 
 rng = np.random.default_rng(20130601)

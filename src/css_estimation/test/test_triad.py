@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from css_estimation.attitude_start import chosen_sun, start
-from css_estimation.lit_sun_vector import lit_sun
+from css_estimation.attitude.attitude_start import chosen_sun, start
+from css_estimation.attitude.lit_sun_vector import lit_sun
+from css_estimation.attitude.triad import LEAST_SINE, triad, triad_covariance
 from css_estimation.symmetric import row_major
-from css_estimation.triad import LEAST_SINE, triad, triad_covariance
 
 rng = np.random.default_rng(1981)
 angles = st.floats(0.0, 2.0 * math.pi)

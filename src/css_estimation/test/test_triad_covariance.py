@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from css_estimation.slit_angles import sun_covariance, sun_vector
-from css_estimation.sun_field_attitude import (
+from css_estimation.attitude.sun_field_attitude import (
     MODE_FIELD_FIRST,
     MODE_NONE,
     MODE_SUN_FIRST,
@@ -21,7 +20,8 @@ from css_estimation.sun_field_attitude import (
     interpolated_variance,
     sun_field_attitude,
 )
-from css_estimation.triad import triad, triad_covariance, triad_covariance_of
+from css_estimation.attitude.triad import triad, triad_covariance, triad_covariance_of
+from css_estimation.spin.slit_angles import sun_covariance, sun_vector
 
 unit_vectors = st.tuples(*3 * [st.floats(-1.0, 1.0)]).filter(lambda v: np.linalg.norm(v) > 0.1)
 

@@ -15,9 +15,9 @@ from css_common.kernel import kernel
 from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
-from css_estimation import wavg
-from css_estimation.cell_layout import brightest, cell_layout
-from css_estimation.snapshot import MODE_NO_SUN
+from css_estimation.sun import wavg
+from css_estimation.sun.cell_layout import brightest, cell_layout
+from css_estimation.sun.snapshot import MODE_NO_SUN
 
 
 def wavg_parameters(**changes):

@@ -23,8 +23,8 @@ from css_common.sections import name_for_files
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
-from css_recording.cell_layout import CellLayout
 from css_recording.errors import BagError
+from css_recording.layout_file import CellLayout
 from css_recording.provenance import software_versions
 from css_recording.telemetry_table import Telemetry, TelemetryRow
 

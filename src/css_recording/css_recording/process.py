@@ -5,8 +5,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import rclpy
-from rclpy._rclpy_pybind11 import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 from rclpy.signals import SignalHandlerOptions
+
+from css_common.ros_internals import RCLError, RCLInvalidROSArgsError, UnknownROSArgsError
 
 
 class RosArgumentsError(Exception):

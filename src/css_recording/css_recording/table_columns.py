@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from css_recording.cell_layout import CellLayout
 from css_recording.errors import BagError
+from css_recording.layout_file import CellLayout
 from css_recording.table_text import Line, TableText, name_and_unit
 from css_recording.table_values import TIME_UNITS, plain_number
 

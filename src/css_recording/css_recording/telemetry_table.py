@@ -23,8 +23,8 @@ from collections.abc import Container, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from css_recording.cell_layout import CellLayout
 from css_recording.errors import BagError
+from css_recording.layout_file import CellLayout
 from css_recording.sentinels import fill_values
 from css_recording.table_columns import TIME_NAMES, Columns, Indices, identify_columns
 from css_recording.table_text import Line, TableText, read_table

@@ -14,10 +14,10 @@ from css_common.mission_file import flattened, read_sections
 from css_common.schema import checked_values
 from css_common.sections import SECTIONS
 from css_recording.bag_reader import BagReader
-from css_recording.cell_layout import CellLayout
 from css_recording.commands.import_csv import main
 from css_recording.csv_import import import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
+from css_recording.layout_file import CellLayout
 from css_recording.telemetry_table import read_telemetry
 
 LAYOUT = CellLayout(("c1", "c2"), ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8)))

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from css_recording.cell_layout import CellLayout
 from css_recording.errors import BagError
+from css_recording.layout_file import CellLayout
 from css_recording.sentinels import fill_values
 from css_recording.table_columns import likenesses
 from css_recording.table_times import LONGEST_NS, consistent_lines

@@ -16,15 +16,15 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from css_analysis.readable_table import ReadableTable
 from css_bringup import monte_carlo_bench
-from css_bringup.flight import FlightResult
-from css_bringup.flying import fly, own_domain
+from css_bringup.flight_result import FlightResult
+from css_bringup.fly_mission import fly, own_domain
 from css_bringup.json_process import MeasurementError
 from css_bringup.options import add_domain_option, complain, console, guarded, whole_number
 from css_bringup.report import print_json
 from css_common.command import CommandParser, command_parser
 from css_common.mission import Mission, load_mission
-from css_studies.readable_table import ReadableTable
 
 _CONFIGURATIONS = {
     "composed": (False, False),

@@ -10,10 +10,12 @@ import argparse
 import sys
 from pathlib import Path
 
+from css_analysis.flight_log import read_flight
+from css_analysis.flight_metrics import estimator_runs
 from css_bringup.commands.replay import print_replay
-from css_bringup.figures import print_figures
-from css_bringup.flight import default_bag
-from css_bringup.flying import fly, own_domain
+from css_bringup.figure_files import print_figures
+from css_bringup.flight_result import default_bag
+from css_bringup.fly_mission import fly, own_domain
 from css_bringup.options import (
     add_domain_option,
     add_mission_options,
@@ -24,13 +26,11 @@ from css_bringup.options import (
     guarded,
     mission_of,
 )
-from css_bringup.replay import parse_request
-from css_bringup.replaying import default_replay, replay
+from css_bringup.replay_bag import default_replay, replay
+from css_bringup.replay_pass import parse_request
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
 from css_common.progress_lines import still_working
-from css_studies.flight_log import read_flight
-from css_studies.flight_metrics import estimator_runs
 
 _EXAMPLES = ("", "okeefe_2013 --duration 600 --out bags/first", "okeefe_2013 --case 7 --figures figures")
 _EXITS = {0: "flown, and all pass criteria of the mission met", 1: "the flight failed or missed a criterion"}

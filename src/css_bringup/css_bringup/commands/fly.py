@@ -4,8 +4,12 @@
 import argparse
 import sys
 
-from css_bringup.flight import FlightResult, default_bag
-from css_bringup.flying import fly, own_domain
+from css_analysis.flight_log import read_flight
+from css_analysis.flight_metrics import Run, estimator_runs
+from css_analysis.spin_flight import read_spinning
+from css_analysis.spin_summary import spin_lines, spin_object
+from css_bringup.flight_result import FlightResult, default_bag
+from css_bringup.fly_mission import fly, own_domain
 from css_bringup.options import (
     add_domain_option,
     add_mission_options,
@@ -20,10 +24,6 @@ from css_bringup.report import flight_object, print_incidents, print_json, print
 from css_common.command import FAILED, INTERRUPTED, CommandParser, command_parser
 from css_common.mission import Mission
 from css_recording.errors import BagError
-from css_studies.flight_log import read_flight
-from css_studies.flight_metrics import Run, estimator_runs
-from css_studies.spin_flight import read_spinning
-from css_studies.spin_summary import spin_lines, spin_object
 
 _EXAMPLES = (
     "okeefe_2013",

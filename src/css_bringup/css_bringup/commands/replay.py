@@ -13,17 +13,17 @@ import argparse
 import sys
 from pathlib import Path
 
-from css_bringup.figures import print_figures
+from css_analysis.flight_summary import summary_table
+from css_bringup.figure_files import print_figures
 from css_bringup.options import complain, console, guarded
-from css_bringup.replay import parse_request
+from css_bringup.replay_bag import ReplayResult, default_replay, mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_bringup.replay_verdict import is_rounding
 from css_bringup.replayed import Replayed
-from css_bringup.replaying import ReplayResult, default_replay, mission_of_bag, replay
 from css_bringup.report import print_json
 from css_common.command import FAILED, CommandParser, command_parser
 from css_common.mission_file import MissionError
 from css_common.progress_lines import still_working
-from css_studies.flight_summary import summary_table
 
 _EXAMPLES = (
     "bags/FLIGHT",

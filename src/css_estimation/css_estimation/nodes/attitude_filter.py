@@ -8,8 +8,8 @@ from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sensor_inputs import field_input, gyro_input
-from css_estimation import attitude_ekf, attitude_options, attitude_solution, flight_references
-from css_estimation.flight_references import FlightReferences
+from css_estimation.attitude import attitude_ekf, attitude_options, attitude_solution, flight_references
+from css_estimation.attitude.flight_references import FlightReferences
 from css_estimation.messages import attitude_estimate_fields, cells_input, field_reading, gyro_reading
 from css_msgs.msg import AttitudeEstimate
 

@@ -11,9 +11,9 @@ from css_common.codec import Sample
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.run import node_main
 from css_common.schema import Values, real, reals
-from css_estimation.coning import Coning as ConingResult
-from css_estimation.coning import Passages, analyse_coning
-from css_estimation.coning_spectrum import MOST_CANDIDATES
+from css_estimation.spin.coning import Coning as ConingResult
+from css_estimation.spin.coning import Passages, analyse_coning
+from css_estimation.spin.coning_spectrum import MOST_CANDIDATES
 from css_msgs.msg import ConingEstimate, SlitSunAngle
 
 _COLUMNS = len(Passages._fields)

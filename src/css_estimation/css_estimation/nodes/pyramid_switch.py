@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from css_common.run import node_main
 from css_common.schema import Values
-from css_estimation import pyramid_switch
-from css_estimation.safe_hold import MODE_NAMES
-from css_estimation.sun_estimator import SunEstimator
+from css_estimation.sun import pyramid_switch
+from css_estimation.sun.safe_hold import MODE_NAMES
+from css_estimation.sun.sun_estimator import SunEstimator
 
 
 class PyramidSwitch(SunEstimator):

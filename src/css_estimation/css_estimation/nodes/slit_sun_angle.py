@@ -12,10 +12,10 @@ from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
-from css_estimation import slit_measurement, slit_passage
-from css_estimation.slit_measurement import HALF_COUNT, SunAngle
-from css_estimation.slit_passage import REASON_NONE, REASON_UNKNOWN, Passage
-from css_estimation.slit_timer_counts import UnwrappedTimer
+from css_estimation.spin import slit_measurement, slit_passage
+from css_estimation.spin.slit_measurement import HALF_COUNT, SunAngle
+from css_estimation.spin.slit_passage import REASON_NONE, REASON_UNKNOWN, Passage
+from css_estimation.spin.slit_timer_counts import UnwrappedTimer
 from css_estimation.symmetric import row_major
 from css_msgs.msg import SlitPulses, SlitSunAngle
 

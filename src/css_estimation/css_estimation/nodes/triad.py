@@ -15,9 +15,9 @@ from css_common.schema import Values, choice
 from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
-from css_estimation import flight_references, sun_field_attitude
+from css_estimation.attitude import flight_references, sun_field_attitude
+from css_estimation.attitude.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN
 from css_estimation.messages import field_reading
-from css_estimation.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN
 from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
 

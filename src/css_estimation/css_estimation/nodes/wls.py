@@ -5,8 +5,8 @@ from types import ModuleType
 from typing import ClassVar
 
 from css_common.run import node_main
-from css_estimation import least_squares
-from css_estimation.sun_estimator import SunEstimator
+from css_estimation.sun import least_squares
+from css_estimation.sun.sun_estimator import SunEstimator
 
 
 class Wls(SunEstimator):

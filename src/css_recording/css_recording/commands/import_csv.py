@@ -8,11 +8,12 @@ from pathlib import Path
 
 from css_common.command import FAILED, USAGE, CommandParser, command_parser, complain
 from css_common.epochs import parse_utc
-from css_recording import cell_layout, telemetry_table
+from css_recording import layout_file as cell_layout
+from css_recording import telemetry_table
 from css_recording.bag_folder import fresh_folder
-from css_recording.cell_layout import read_layout
 from css_recording.csv_import import ImportReport, import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
+from css_recording.layout_file import read_layout
 from css_recording.table_columns import likenesses
 from css_recording.table_values import TIME_UNITS
 from css_recording.telemetry_table import read_telemetry

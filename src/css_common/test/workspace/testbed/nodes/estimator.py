@@ -40,9 +40,7 @@ class Estimator(Component):
         """Voltages, and what it is told to listen to."""
         inputs = [Input("voltages", "voltages", CssVoltages, lengths={"voltages": 2})]
         if values.use_gyro:
-            inputs.append(
-                Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), switch="use_gyro")
-            )
+            inputs.append(Input("gyro", "gyro/imu", Imu, required=False, used=("angular_velocity",), switch="use_gyro"))
         if values.use_field:
             inputs.append(
                 Input("field", "mag/field", MagneticField, required=False, divider=DIVIDER, used=("magnetic_field",))

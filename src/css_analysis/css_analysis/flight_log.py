@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One flight as columns: the truth, every estimate of the Sun or the attitude, cells, wheels and control.
+
+It is read from a recording (`read_flight`) or flown in this process (`css_monte_carlo.direct_flight`). Topics are
+recognised by their message type, so recordings of other vehicles and under other names work as long as they
+carry Sunpoint's types. Nothing is required: without truth there are no errors to tell, without control no
+modes.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from css_analysis.message_columns import Columns, stack
+from css_common.attitude import mrp_to_dcm
+from css_common.codec import Codec, DecodeError, codec_of
+from css_common.kernel import kernel
+from css_common.mission import Mission, MissionError, mission_from_text
+from css_common.sections import SPACECRAFT
+from css_common.vectors import multiply, row
+from css_msgs.msg import (
+    AttitudeEstimate,
+    ControlStatus,
+    CssVoltages,
+    SpacecraftState,
+    SunEstimate,
+    WheelState,
+    WheelTorqueCommand,
+)
+from css_recording.errors import BagError
+
+IMPORTED_FROM = "imported_from"
+"""Entry in the description of a recording that was made of a table of telemetry."""
+
+SUNLIT_FRACTION = 0.5
+"""The flight is sunlit while more than this fraction of the solar disc is in view."""
+
+# Messages of estimators, of which a flight may have several: attribute of the log and end of the topic.
+_ESTIMATES = {SunEstimate: ("estimates", "/sun_estimate"), AttitudeEstimate: ("attitudes", "/attitude")}
+
+# Topics that a flight has once: attribute of the log, type, name in Sunpoint's own recordings.
+_SINGLE = {
+    "truth": (SpacecraftState, "/truth"),
+    "voltages": (CssVoltages, "/css/voltages"),
+    "wheels": (WheelState, "/wheels/state"),
+    "torque_command": (WheelTorqueCommand, "/wheels/torque_command"),
+    "control": (ControlStatus, "/control/status"),
+}
+LOGGED_TYPES: dict[str, type] = {
+    f"css_msgs/msg/{kind.__name__}": kind for kind in (*_ESTIMATES, *(kind for kind, _ in _SINGLE.values()))
+}
+"""Messages that a log holds, type name to class."""
+_ARRAY_NORMAL = next(p for p in SPACECRAFT if p.name == "spacecraft.array_normal")
+
+
+def angle(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angles [rad] between the rows of two (M, 3) arrays (or one vector), accurate near 0 and pi alike."""
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), np.sum(a * b, axis=-1))
+
+
+@kernel
+def _turned_to_body(sigma_bn, vectors_n, vectors_b_out) -> None:
+    for i in range(sigma_bn.shape[0]):
+        v = multiply(mrp_to_dcm(row(sigma_bn, i)), row(vectors_n, i))
+        vectors_b_out[i, 0], vectors_b_out[i, 1], vectors_b_out[i, 2] = v
+
+
+def to_body(sigma_bn: np.ndarray, vectors_n: np.ndarray) -> np.ndarray:
+    """Components in b, (M, 3), of vectors (M, 3) given in n, for attitudes sigma_bn (M, 3)."""
+    vectors_b = np.empty_like(vectors_n)
+    _turned_to_body(sigma_bn, vectors_n, vectors_b)
+    return vectors_b
+
+
+@dataclass
+class FlightLog:
+    """One flight. Columns hold the fields of their messages, in SI units and radians, in the order of time.
+
+    Attributes:
+        origin: where it comes from, for messages and titles.
+        mission: what flew, None when unknown.
+        truth: `SpacecraftState` columns, None for telemetry of a real vehicle.
+        estimates: name of the estimator to `SunEstimate` columns.
+        attitudes: name of the attitude filter to `AttitudeEstimate` columns.
+        voltages, wheels, torque_command, control: columns of the topic, None when there is none.
+        notes: what could not be read, one line each.
+        imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
+            arrays of its mission are defaults that nobody gave.
+    """
+
+    origin: str
+    mission: Mission | None = None
+    truth: Columns | None = None
+    estimates: dict[str, Columns] = field(default_factory=dict)
+    attitudes: dict[str, Columns] = field(default_factory=dict)
+    voltages: Columns | None = None
+    wheels: Columns | None = None
+    torque_command: Columns | None = None
+    control: Columns | None = None
+    notes: list[str] = field(default_factory=list)
+    imported: bool = False
+
+    def columns(self) -> list[Columns]:
+        """All columns of the log, none of them empty."""
+        single = [getattr(self, name) for name in _SINGLE]
+        estimates = [*self.estimates.values(), *self.attitudes.values()]
+        return [columns for columns in (*single, *estimates) if columns is not None]
+
+    def add(self, topic: str, message_type: type, columns: Columns) -> None:
+        """Take the messages of a topic; types that no log holds, and topics without messages, are ignored.
+
+        Of several topics of a type that a flight has once, that under Sunpoint's own name is kept, else the first.
+        """
+        if len(columns) == 0:
+            return
+        if message_type in _ESTIMATES:
+            attribute, _ = _ESTIMATES[message_type]
+            getattr(self, attribute)[estimator_of(topic)] = columns
+            return
+        for attribute, (kind, usual) in _SINGLE.items():
+            if kind is not message_type:
+                continue
+            taken = getattr(self, attribute) is not None
+            if taken:
+                self.notes.append(f"of several topics with {kind.__name__} one is taken, {usual} if it is there")
+            if not taken or topic == usual:
+                setattr(self, attribute, columns)
+
+    @cached_property
+    def epoch_ns(self) -> int:
+        """Instant from which `time` counts: the mission's epoch, else the first stamp of the log."""
+        if self.mission is not None:
+            return self.mission.epoch_ns
+        return min((int(columns.stamp_ns[0]) for columns in self.columns()), default=0)
+
+    def having(self, topic: str) -> Columns:
+        """The columns called `topic` (`truth`, `wheels`, ...), where the log must have them.
+
+        Raises:
+            ValueError: it has none.
+        """
+        columns = getattr(self, topic)
+        if columns is None:
+            raise ValueError(f"{self.origin}: the flight has no {topic}")
+        return columns
+
+    def time(self, columns: Columns) -> np.ndarray:
+        """Time [s] of each row since the epoch."""
+        return (columns.stamp_ns - self.epoch_ns) * 1e-9
+
+    @property
+    def name(self) -> str:
+        """Name of the mission, else of the recording."""
+        return self.mission.name if self.mission is not None else Path(self.origin).name
+
+    @cached_property
+    def array_normal_b(self) -> np.ndarray:
+        """(3,) normal of the solar arrays; the default spacecraft's when the mission is unknown."""
+        if self.mission is not None:
+            return self.mission.values.spacecraft.array_normal
+        return _ARRAY_NORMAL.shaped(_ARRAY_NORMAL.default)
+
+    @cached_property
+    def flown(self) -> str | None:
+        """Name of the estimator that the control listened to; None without control or when unknown."""
+        controlled = self.control is not None or self.torque_command is not None
+        if self.mission is None or not controlled:
+            return None
+        return self.mission.values.graph.estimator
+
+    def uses_gyro(self, name: str) -> bool:
+        """Whether an estimator may use the gyro, by its parameter; of an unknown node, whether it did."""
+        nodes = self.mission.nodes if self.mission is not None else ()
+        for node in nodes:
+            if node.name == name and hasattr(node.values, "use_gyro"):
+                return bool(node.values.use_gyro)
+        if name in self.attitudes:
+            return bool(np.any(self.attitudes[name].used & AttitudeEstimate.USED_GYRO))
+        return bool(np.any(self.estimates[name].rate_source == SunEstimate.RATE_GYRO))
+
+    @cached_property
+    def period(self) -> float:
+        """Time [s] from one step of the truth to the next; 0 with fewer than two steps."""
+        if self.truth is None or len(self.truth) < 2:
+            return 0.0
+        return float(np.median(np.diff(self.truth.stamp_ns))) * 1e-9
+
+    @cached_property
+    def sun_b(self) -> np.ndarray:
+        """(M, 3) true direction to the Sun in b at every step of the truth."""
+        truth = self.having("truth")
+        return to_body(truth.sigma_bn, truth.sun_n)
+
+    @cached_property
+    def sunlit(self) -> np.ndarray:
+        """(M,) True at steps of the truth with more than half of the solar disc in view."""
+        return self.having("truth").illumination > SUNLIT_FRACTION
+
+    @cached_property
+    def pointing_error(self) -> np.ndarray:
+        """(M,) angle [rad] between the array normal and the true Sun at every step of the truth."""
+        return angle(self.sun_b, self.array_normal_b)
+
+    @cached_property
+    def rate(self) -> np.ndarray:
+        """(M,) norm of the true body rate [rad/s]."""
+        return np.linalg.norm(self.having("truth").omega_bn_b, axis=1)
+
+    def truth_rows(self, columns: Columns) -> tuple[np.ndarray, np.ndarray]:
+        """Pairs of rows that belong to one instant: rows of `columns`, rows of the truth.
+
+        Stamps of one flight agree exactly; those of devices with own clocks belong to the nearest step of the
+        truth within half a period.
+        """
+        stamps = self.having("truth").stamp_ns
+        after = np.clip(np.searchsorted(stamps, columns.stamp_ns), 0, len(stamps) - 1)
+        before = np.maximum(after - 1, 0)
+        nearer = np.abs(stamps[after] - columns.stamp_ns) <= np.abs(stamps[before] - columns.stamp_ns)
+        rows = np.where(nearer, after, before)
+        near = np.abs(stamps[rows] - columns.stamp_ns) <= 0.5e9 * self.period
+        return np.flatnonzero(near), rows[near]
+
+
+def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> FlightLog:
+    """The flight of a recording.
+
+    Args:
+        path: rosbag2 folder or `.mcap` file, Sunpoint's own or foreign.
+        remap: new names of topics, as `BagReader` takes them.
+
+    Raises:
+        BagError: it cannot be read, holds a topic of another definition of its type, or none of the types that a
+            flight is made of. Damaged messages are left out and noted.
+    """
+    from css_recording.bag_reader import BagReader  # a quarter of a second that studies without bags need not pay
+
+    with BagReader(path, remap) as reader:
+        mission, notes = None, []
+        imported = IMPORTED_FROM in reader.description
+        text = reader.mission_text
+        if text is not None:
+            try:
+                mission = mission_from_text(text, f"{path}: mission")
+            except MissionError as error:
+                notes.append(f"the recorded mission is not valid here: {error}")
+        messages: dict[str, tuple[type, list[bytes]]] = {
+            topic.name: (LOGGED_TYPES[topic.type], []) for topic, _ in reader.topics if topic.type in LOGGED_TYPES
+        }
+        if not messages:
+            raise BagError(f"{path}: holds no truth, estimate, cell output, wheel or control message")
+        append = {topic: received.append for topic, (_, received) in messages.items()}
+        for topic, _, _, data in reader.messages(messages):
+            append[topic](data)
+        notes += [*reader.notes, *map(str, reader.refused)]
+    log = FlightLog(str(path), mission, notes=notes, imported=imported)
+    for topic, (message_type, received) in messages.items():
+        log.add(topic, message_type, _whole(topic, codec_of(message_type), received, notes).sorted())
+    return log
+
+
+def _whole(topic: str, codec: Codec, received: list[bytes], notes: list[str]) -> Columns:
+    """Columns of the messages that are whole; others are left out and noted."""
+    try:
+        return stack(codec, received)
+    except DecodeError as error:
+        good = [data for data in received if _decodes(codec, data)]
+        count = len(received) - len(good)
+        notes.append(f"topic {topic}: {count} of {len(received)} messages left out: {error}")
+        return stack(codec, good)
+
+
+def _decodes(codec: Codec, data: bytes) -> bool:
+    try:
+        codec.decode(data)
+    except DecodeError:
+        return False
+    return True
+
+
+def estimator_of(topic: str) -> str:
+    """Name of the estimator that publishes a topic: `/ekf/sun_estimate` is of `ekf`."""
+    for _, suffix in _ESTIMATES.values():
+        if topic.endswith(suffix):
+            return topic.removesuffix(suffix).strip("/") or suffix.strip("/")
+    return topic.strip("/")

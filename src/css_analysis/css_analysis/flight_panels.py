@@ -1,0 +1,206 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The panels that show a flight against time; `css_analysis.flight_figures` arranges and writes them."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from css_analysis.estimate_errors import attitude_errors, heading_errors
+from css_analysis.figure_style import (
+    BLACK,
+    BLUE,
+    Colour,
+    colours,
+    draw_series,
+    legend,
+    level_line,
+    logarithmic,
+    shade_dark,
+)
+from css_analysis.flight_log import FlightLog
+from css_analysis.message_columns import Columns
+from css_msgs.msg import ControlStatus, SunEstimate
+
+_RPM = 60.0 / (2.0 * np.pi)
+_LEAST_ERROR = 1e-2  # [deg] below it an error is drawn as this, for the logarithmic axis
+_MODES = {
+    ControlStatus.MODE_SAFE: "safe",
+    ControlStatus.MODE_DETUMBLE: "detumble",
+    ControlStatus.MODE_SUN_SEARCH: "search",
+    ControlStatus.MODE_SUN_ACQUISITION: "acquisition",
+    ControlStatus.MODE_SUN_POINT: "point",
+    ControlStatus.MODE_ECLIPSE: "eclipse",
+}
+
+
+class TimeAxis(NamedTuple):
+    """Abscissa of a flight."""
+
+    scale: float  # [s] of one unit
+    label: str
+    first: float  # in its unit
+    last: float
+
+
+def time_axis(log: FlightLog) -> TimeAxis:
+    """From the first to the last message; in minutes when that is longer than ten of them, else in seconds."""
+    spans = [log.time(columns)[[0, -1]] for columns in log.columns()]
+    first, last = min(span[0] for span in spans), max(span[1] for span in spans)
+    scale, label = (60.0, "time [min]") if last - first > 600.0 else (1.0, "time [s]")
+    return TimeAxis(scale, label, first / scale, last / scale)
+
+
+def shade_eclipse(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    """Grey background where the flight is not sunlit; without truth, where an estimator says so."""
+    if log.truth is not None:
+        columns, dark = log.truth, ~log.sunlit
+    elif log.estimates:
+        columns = next(iter(log.estimates.values()))
+        dark = columns.eclipse == SunEstimate.ECLIPSE_ECLIPSED
+    else:
+        return
+    shade_dark(axes, log.time(columns) / unit.scale, dark)
+
+
+def draw_heading_error(axes: Axes, log: FlightLog, unit: TimeAxis, name: str, colour: Colour, label: str) -> None:
+    """Angle of estimated to true Sun; a stretch of steps without estimate is a gap in the line."""
+    steps, errors = heading_errors(log, name)
+    _draw_errors(axes, log, unit, steps, errors, colour, label)
+
+
+def _draw_errors(axes, log: FlightLog, unit: TimeAxis, steps, errors, colour: Colour, label: str) -> None:
+    degrees = np.maximum(np.degrees(errors), _LEAST_ERROR)
+    time = log.time(log.having("truth"))[steps] / unit.scale
+    spacing = np.diff(steps, prepend=steps[:1])
+    gaps = np.flatnonzero(spacing > 3 * max(np.median(spacing), 1)) if len(steps) else steps
+    draw_series(axes, np.insert(time, gaps, np.nan), np.insert(degrees, gaps, np.nan), colour, label)
+
+
+def draw_pointing_error(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str = "") -> None:
+    """Angle of array normal to true Sun."""
+    draw_series(axes, log.time(log.having("truth")) / unit.scale, np.degrees(log.pointing_error), colour, label)
+
+
+def draw_true_rate(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str) -> None:
+    """Norm of the true body rate."""
+    draw_series(axes, log.time(log.having("truth")) / unit.scale, np.degrees(log.rate), colour, label)
+
+
+def finish_heading_error(axes: Axes) -> None:
+    """Axis of heading errors."""
+    logarithmic(axes)
+    axes.set_ylabel("angle [deg]")
+    legend(axes)
+
+
+def finish_pointing_error(axes: Axes) -> None:
+    """Axis of pointing errors, with the angles that matter: power positive, and the deadband of the paper."""
+    level_line(axes, 30.0, "30°, power positive")
+    level_line(axes, 15.0, "15°")
+    axes.set_ylim(0.0, max(45.0, axes.get_ylim()[1]))
+    axes.set_ylabel("angle [deg]")
+
+
+def finish_rate(axes: Axes) -> None:
+    """Axis of body rates."""
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("rate [deg/s]")
+    legend(axes)
+
+
+def _heading_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    for name, colour in zip(log.estimates, colours(len(log.estimates)), strict=True):
+        gyro = "gyro" if log.uses_gyro(name) else "no gyro"
+        label = f"{name} ({gyro}{', flown' if name == log.flown else ''})"
+        draw_heading_error(axes, log, unit, name, colour, label)
+    finish_heading_error(axes)
+
+
+def _attitude_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    for name, colour in zip(log.attitudes, colours(len(log.attitudes)), strict=True):
+        steps, errors, _ = attitude_errors(log, name)
+        _draw_errors(axes, log, unit, steps, errors, colour, name)
+    finish_heading_error(axes)
+
+
+def _pointing_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    draw_pointing_error(axes, log, unit, BLACK)
+    finish_pointing_error(axes)
+
+
+def _body_rate(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    estimates = log.estimates | log.attitudes
+    for (name, columns), colour in zip(estimates.items(), colours(len(estimates)), strict=True):
+        rate = np.degrees(np.linalg.norm(columns.omega_bn_b, axis=1))
+        draw_series(axes, log.time(columns) / unit.scale, rate, colour, f"estimated by {name}")
+    if log.truth is not None:
+        draw_true_rate(axes, log, unit, BLACK, "true")
+    finish_rate(axes)
+
+
+def _wheel_speed(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    wheels = log.having("wheels")
+    _draw_all(axes, log, unit, wheels, wheels.speed * _RPM)
+    axes.set_ylabel("speed [rpm]")
+    legend(axes, title="wheel")
+
+
+def _cell_output(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    cells = log.having("voltages")
+    outputs = cells.voltages
+    _draw_all(axes, log, unit, cells, outputs)
+    axes.set_ylim(bottom=min(0.0, float(np.nanmin(outputs))))
+    axes.set_ylabel("output [-]")
+    legend(axes, title="cell")
+
+
+def _draw_all(axes: Axes, log: FlightLog, unit: TimeAxis, columns: Columns, values: np.ndarray) -> None:
+    time = log.time(columns) / unit.scale
+    for i, colour in enumerate(colours(values.shape[1])):
+        draw_series(axes, time, values[:, i], colour, f"{i}")
+
+
+def _control_mode(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    control = log.having("control")
+    modes = control.mode
+    # only the corners of the staircase are drawn
+    turns = np.flatnonzero(np.diff(modes)) + 1
+    corners = np.unique(np.concatenate(([0], turns - 1, turns, [len(modes) - 1])))
+    axes.step(log.time(control)[corners] / unit.scale, modes[corners], where="post", color=BLUE)
+    axes.set_yticks(list(_MODES), list(_MODES.values()))
+    axes.set_ylim(-0.5, len(_MODES) - 0.5)
+
+
+class Panel(NamedTuple):
+    """One set of axes."""
+
+    name: str  # of its file
+    title: str
+    height: float  # relative to the others in the overview
+    draw: Callable[[Axes, FlightLog, TimeAxis], None]
+
+
+_HEADING_ERROR = Panel("heading_error", "Estimated to true Sun", 1.3, _heading_error)
+_ATTITUDE_ERROR = Panel("attitude_error", "Estimated to true attitude", 1.3, _attitude_error)
+_POINTING_ERROR = Panel("pointing_error", "Array normal to true Sun", 1.0, _pointing_error)
+_BODY_RATE = Panel("body_rate", "Body rate", 1.0, _body_rate)
+_CONTROL_MODE = Panel("control_mode", "Control mode", 0.8, _control_mode)
+_WHEEL_SPEED = Panel("wheel_speed", "Wheel speed", 1.0, _wheel_speed)
+_CELL_OUTPUT = Panel("cell_output", "Cell output", 1.2, _cell_output)
+
+
+def panels_of(log: FlightLog) -> list[Panel]:
+    """The panels for which the flight has data, from top to bottom."""
+    has_truth, has_estimates = log.truth is not None, bool(log.estimates)
+    chosen = {
+        _HEADING_ERROR: has_truth and has_estimates,
+        _ATTITUDE_ERROR: has_truth and bool(log.attitudes),
+        _POINTING_ERROR: has_truth,
+        _BODY_RATE: has_truth or has_estimates or bool(log.attitudes),
+        _CONTROL_MODE: log.control is not None,
+        _WHEEL_SPEED: log.wheels is not None,
+        _CELL_OUTPUT: log.voltages is not None,
+    }
+    return [panel for panel, has_data in chosen.items() if has_data]

@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What people read of the runs of a flight: a table, and the mission's pass criteria that they miss."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple, TextIO
+
+from rich.console import Console
+
+from css_analysis.flight_metrics import QUANTITIES, WITHOUT_VALUE, Run
+from css_analysis.readable_table import ReadableTable
+from css_common.schema import unknown_name
+
+_COLUMNS = {
+    "power_positive_s": ("con-\nverging\n[s]", "{:.1f}"),
+    "heading_error_mean_deg": ("heading\nerror\nmean\n[deg]", "{:.2f}"),
+    "heading_error_p95_deg": ("heading\nerror\n95 %\n[deg]", "{:.2f}"),
+    "attitude_error_mean_deg": ("attitude\nerror\nmean\n[deg]", "{:.3f}"),
+    "attitude_error_p95_deg": ("attitude\nerror\n95 %\n[deg]", "{:.3f}"),
+    "attitude_nees": ("attitude\nNEES\n(3)", "{:.2f}"),
+    "pointing_error_mean_deg": ("pointing\nerror\nmean\n[deg]", "{:.2f}"),
+    "rate_final_deg_s": ("final\nrate\n[deg/s]", "{:.3f}"),
+    "steps_without_estimate": ("steps\nwithout\nestimate", "{:d}"),
+}
+
+
+def summary_table(runs: Iterable[Run], title: str = "") -> ReadableTable:
+    """The runs as a table for a `rich` console; what is unknown or was never reached is a dash.
+
+    It fits into 80 columns, which is what a console has that is no terminal; in fewer each run is a block of lines.
+    """
+    runs = list(runs)
+    table = ReadableTable(title or None)
+    table.add_name("estimator")
+    table.add_number("gyro")
+    columns = _columns_of(runs)
+    for heading, _ in columns.values():
+        table.add_number(heading)
+    for run in runs:
+        shown = []
+        for quantity, (_, text) in columns.items():
+            value = run[quantity]
+            shown.append("-" if value is None else text.format(value))
+        table.add_texts([run["estimator"] + (" (flown)" if run["flown"] else ""), run["gyro"], *shown])
+    return table
+
+
+def _columns_of(runs: Sequence[Run]) -> dict[str, tuple[str, str]]:
+    """The columns of Sun estimators, and where there are attitude filters, theirs and what else has a value."""
+    if any(run["attitude_error_mean_deg"] is not None for run in runs):
+        return {name: column for name, column in _COLUMNS.items() if any(run[name] is not None for run in runs)}
+    return {name: column for name, column in _COLUMNS.items() if not name.startswith("attitude")}
+
+
+def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = None) -> None:
+    """Print the runs, in colours on a terminal."""
+    Console(file=file, highlight=False).print(summary_table(runs, title))
+
+
+class Verdict(NamedTuple):
+    """What became of one limit of one criterion."""
+
+    estimator: str
+    quantity: str
+    value: float | None  # None: it has none
+    bound: str  # "min" or "max"
+    limit: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether the criterion is met; a quantity without a value meets none."""
+        if self.value is None:
+            return False
+        return self.value >= self.limit if self.bound == "min" else self.value <= self.limit
+
+    def line(self) -> str:
+        """PASS or FAIL, and why."""
+        word = "PASS" if self.passed else "FAIL"
+        value = "no value" if self.value is None else f"{self.value:.6g}"
+        relation = "at least" if self.bound == "min" else "at most"
+        return f"{word}  {self.quantity} {value}, must be {relation} {self.limit:g}  ({self.estimator})"
+
+
+def criteria_verdicts(criteria: Mapping[str, Mapping[str, float]], runs: Iterable[Run]) -> list[Verdict]:
+    """Every limit of the pass criteria that are known, for every run that they judge (see `criteria_failures`)."""
+    runs = list(runs)
+    judged = [run for run in runs if run["flown"]] or runs
+    return [
+        Verdict(run["estimator"], quantity, run[quantity], bound, limits[bound])
+        for quantity, limits in criteria.items()
+        if quantity in QUANTITIES
+        for run in judged
+        for bound in ("min", "max")
+        if limits.get(bound) is not None
+    ]
+
+
+def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterable[Run]) -> list[str]:
+    """The pass criteria of a mission that its runs miss, one line each.
+
+    Criteria judge the estimator that flew; where none did (a replay), all of them. A quantity without a value
+    (never acquired, no truth) meets no criterion.
+
+    Args:
+        criteria: quantity to its limits `min` and `max` (`Mission.criteria`).
+        runs: of one flight, from `estimator_runs`.
+    """
+    runs = list(runs)
+    unknown = [quantity for quantity in criteria if quantity not in QUANTITIES]
+    failures = [f"criteria.{unknown_name(quantity, QUANTITIES)}" for quantity in unknown]
+    missed = [verdict for verdict in criteria_verdicts(criteria, runs) if not verdict.passed]
+    failures += dict.fromkeys(map(_failure, missed))
+    if criteria and not runs:
+        failures.append("the flight has no estimate that criteria could judge")
+    return failures
+
+
+def _failure(missed: Verdict) -> str:
+    where, criterion = f"{missed.estimator}: {missed.quantity}", f"criteria.{missed.quantity}"
+    if missed.value is None:
+        why = WITHOUT_VALUE.get(missed.quantity, "truth or estimates are missing")
+        return f"{where} has no value, but {criterion} asks for one: {why}"
+    side = "below" if missed.bound == "min" else "above"
+    return f"{where} is {missed.value:.6g}, {side} {criterion}.{missed.bound} {missed.limit:g}"

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flying with progress on the terminal, in one process or several."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from css_bringup.composed import ComposedFlight
+from css_bringup.flight_result import FlightResult
+from css_bringup.processes import Supervisor, fly_processes
+from css_common import domains, network, places
+from css_common.mission import Mission
+from css_common.preflight import preflight, report
+from css_common.progress_lines import ProgressLines, still_working
+from css_common.stop_signal import StopSignal
+
+
+@contextmanager
+def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: Console) -> Iterator[int]:
+    """A ROS domain that no other flight or test of the machine is in, for all that flies inside the context.
+
+    Args:
+        mission: what flies.
+        asked: the number after `--domain`, if any.
+        bag: where it is recorded, for others who ask.
+        console: where the domain is named.
+
+    Raises:
+        NetworkError: the number is none.
+        DomainError: another flight has the domain, or there is no free one.
+    """
+    recording = str(bag.absolute()) if bag else ""
+    with domains.own(os.environ, mission.name, recording=recording, asked=asked) as held:
+        before = {name: os.environ.pop(name, None) for name in (network.DOMAIN, domains.JOINED)}
+        os.environ[network.DOMAIN] = str(held.domain)
+        console.print(f"ROS domain {held.domain}; ./sunpoint shell, record and play join it", soft_wrap=True)
+        try:
+            yield held.domain
+        finally:
+            del os.environ[network.DOMAIN]
+            os.environ.update({name: value for name, value in before.items() if value is not None})
+
+
+def fly(
+    mission: Mission, bag: Path | None, *, processes: bool, console: Console, overwrite: bool = False
+) -> FlightResult:
+    """Flies a mission to its end, or until Ctrl-C or SIGTERM, after which the recording is complete up to there.
+
+    Args:
+        mission: what to fly.
+        bag: where to record; None records nothing.
+        processes: one process per node instead of one for all.
+        console: where progress is shown, when it is a terminal.
+        overwrite: replace a recording that is there.
+
+    Raises:
+        MissionError: a check before the flight refuses the mission; warnings go to standard error and the result.
+    """
+    warnings = preflight(mission)
+    report(warnings)
+    # noted, not raised: an exception would tear a cycle apart, and a second Ctrl-C the clean-up
+    with StopSignal() as stop:
+        way = _fly_processes if processes else _fly_composed
+        result = way(mission, bag, console, stop, overwrite)
+    result.warnings = warnings
+    return result
+
+
+def _fly_processes(
+    mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
+) -> FlightResult:
+    # without a recording, flights of one mission at the same time differ by their domain
+    flight = bag.name if bag else f"{mission.name}_domain_{os.environ.get(network.DOMAIN, '0')}"
+    logs = places.logs() / "flights" / flight
+    status = f"flying {mission.name}, one process per node; logs in {logs}"
+    named = 0
+
+    def name_restarts(supervisor: Supervisor) -> None:
+        nonlocal named
+        for note in supervisor.notes[named:]:
+            print(note, file=sys.stderr, flush=True)
+        named = len(supervisor.notes)
+
+    with console.status(escape(status)) if _live(console) else still_working(f"flying {mission.name}"):
+        return fly_processes(mission, bag, logs, name_restarts, lambda: stop.came, overwrite=overwrite)
+
+
+def _fly_composed(
+    mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
+) -> FlightResult:
+    with ComposedFlight(mission, bag, overwrite=overwrite) as flight:
+        total = mission.values.mission.duration
+        if not _live(console):
+            lines = ProgressLines(f"flying {mission.name}", "s simulated")
+            return flight.fly(lambda seconds: lines.tell(seconds, total), lambda: stop.came)
+        bar = Progress(
+            TextColumn(f"flying {escape(mission.name)}"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f} of {task.total:.0f} s simulated"),
+            TimeElapsedColumn(),
+            TimeRemainingColumn(),
+            console=console,
+            transient=True,
+        )
+        with bar:
+            task = bar.add_task("", total=total)
+            return flight.fly(lambda seconds: bar.update(task, completed=seconds), lambda: stop.came)
+
+
+def _live(console: Console) -> bool:
+    return console.is_terminal

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: Apache-2.0
+"""State, memory and result of the attitude filter."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.vectors import Vec3
+from css_environment.albedo import new_workspace
+from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters, largest_variances
+from css_estimation.sun import cell_calibration
+from css_estimation.sun.error_covariance import CALIBRATION, new_work
+
+# The numbers of css_msgs/AttitudeEstimate.
+VALIDITY_NONE = 0
+VALIDITY_HELD = 1
+VALIDITY_VALID = 2
+
+USED_FIELD = 1
+USED_SUN = 2
+USED_GYRO = 4
+
+MODE_WAITING = 0
+MODE_STARTED = 1
+MODE_TRACKING = 2
+MODE_PROPAGATING = 3
+MODE_LOST = 4
+
+_ZERO: Vec3 = (0.0, 0.0, 0.0)
+
+
+class AttitudeState(NamedTuple):
+    """Carried from cycle to cycle, beside the arrays of `AttitudeMemory`."""
+
+    started: bool  # there has been an attitude
+    aligned: bool  # there is one
+    sigma_bn: Vec3
+    bias_b: Vec3  # [rad/s]
+    omega_bn_b: Vec3  # [rad/s]
+    gyro_b: Vec3  # [rad/s] last reading
+    gyro_known: bool  # and whether it was one
+    age: float  # [s]
+    contradicted: float  # [s] for how long the field or the Sun has been refused
+
+
+class AttitudeMemory(NamedTuple):
+    """Arrays of one filter that are advanced in place, for N cells and n errors."""
+
+    covariance: np.ndarray  # (n, n)
+    largest: np.ndarray  # (n,) bounds of the variances
+    work: np.ndarray  # (3, n)
+    calibration: np.ndarray  # (N, 3)
+    outputs: np.ndarray  # (N,) room for outputs relative to the Sun at normal incidence
+    albedo: np.ndarray  # (N,) room for predicted light of the Earth
+    albedo_work: np.ndarray  # (224,) room for its prediction
+
+
+class AttitudeSolution(NamedTuple):
+    """Result of one cycle, beside the covariance in the memory; see css_msgs/AttitudeEstimate."""
+
+    sigma_bn: Vec3
+    omega_bn_b: Vec3
+    bias_b: Vec3
+    age: float
+    nis: float
+    nis_dof: int
+    lit_mask: int
+    validity: int
+    used: int
+    mode: int
+
+
+def initial_state(p: AttitudeParameters) -> AttitudeState:
+    """Nothing known, or the given attitude."""
+    given = p.given.is_given
+    return AttitudeState(given, given, p.given.sigma_bn if given else _ZERO, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0)
+
+
+def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
+    """Arrays before the first cycle."""
+    cells = len(p.cells.layout.cells)
+    largest = largest_variances(p)
+    covariance = np.diag(np.full(len(largest), LOST_VARIANCE))
+    if p.given.is_given:
+        for i in range(3):
+            covariance[i, i] = p.given.variance
+    for i in range(3, CALIBRATION):
+        covariance[i, i] = p.bias_variance
+    c = p.cells.calibration
+    for i in range(CALIBRATION, len(largest)):
+        covariance[i, i] = cell_calibration.initial_variance(c, (i - CALIBRATION) % c.per_cell)
+    return AttitudeMemory(
+        covariance=covariance,
+        largest=largest,
+        work=new_work(len(largest)),
+        calibration=cell_calibration.nominal(cells),
+        outputs=np.zeros(cells),
+        albedo=np.zeros(cells),
+        albedo_work=new_workspace(),
+    )
+
+
+@kernel
+def with_attitude(state: AttitudeState, sigma_bn: Vec3, bias_b: Vec3) -> AttitudeState:
+    """The state with another attitude and bias."""
+    s = state
+    return AttitudeState(
+        s.started, s.aligned, sigma_bn, bias_b, s.omega_bn_b, s.gyro_b, s.gyro_known, s.age, s.contradicted
+    )
+
+
+@kernel
+def with_alignment(state: AttitudeState, aligned: bool, contradicted: float) -> AttitudeState:
+    """The state with an attitude that holds or does not, and the time [s] of contradiction."""
+    s = state
+    return AttitudeState(
+        s.started, aligned, s.sigma_bn, s.bias_b, s.omega_bn_b, s.gyro_b, s.gyro_known, s.age, contradicted
+    )

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sun vector by least squares from the lit cells as a measurement of attitude (DiGregorio & Crassidis, "SMM").
+
+s = (N^T N)^-1 N^T V of the lit rows alone: a dark row with an output of zero would bias it. Its covariance is
+sigma^2 (N^T N)^-1, so along the eigenvectors of N^T N its components err independently. Where the lit normals do
+not span space there is no Sun vector, and none is made up.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.vectors import Mat3, Vec3, add, cross, dot, scale
+from css_estimation.attitude.direction_measurement import DirectionMeasurement, no_direction
+from css_estimation.sun.least_squares import normal_equations
+from css_estimation.symmetric import eigen
+
+LEAST_RATIO = 1e-6
+"""Smallest over largest eigenvalue of N^T N below which a direction is unknown."""
+
+
+class LitSun(NamedTuple):
+    """Least squares of the lit cells; `vector` has length 1 up to errors."""
+
+    vector: Vec3  # of least norm where the normals do not span space
+    rank: int  # directions that the lit normals span
+    information: Vec3  # eigenvalues of N^T N, largest first: one over the variance for a cell variance of one
+    axes: Mat3  # their eigenvectors as rows
+
+
+@kernel
+def lit_sun(cells, outputs, mask: int, top: int) -> LitSun:
+    """Sun vector of the cells in `mask`, among them the brightest, `top`.
+
+    Args:
+        outputs: (N,) relative to the Sun at normal incidence.
+    """
+    equations = normal_equations(cells, False, outputs, mask, top)
+    values, axes = eigen(equations.matrix)
+    x = (0.0, 0.0, 0.0)
+    rank = 0
+    for k in range(3):
+        if values[k] > LEAST_RATIO * values[0]:
+            x = add(x, scale(dot(axes[k], equations.vector) / values[k], axes[k]))
+            rank += 1
+    return LitSun(scale(outputs[top], x), rank, values, axes)
+
+
+@kernel
+def sun_vector_measurement(sun: LitSun, predicted_b: Vec3, variance: float) -> DirectionMeasurement:
+    """Sun vector against the unit vector `predicted_b`; `variance` of a cell's output. No update below rank 3."""
+    if sun.rank < 3:
+        return no_direction()
+    u, v, w = sun.axes
+    a, b, c = math.sqrt(sun.information[0]), math.sqrt(sun.information[1]), math.sqrt(sun.information[2])
+    difference = (sun.vector[0] - predicted_b[0], sun.vector[1] - predicted_b[1], sun.vector[2] - predicted_b[2])
+    return DirectionMeasurement(
+        (scale(a, cross(u, predicted_b)), scale(b, cross(v, predicted_b)), scale(c, cross(w, predicted_b))),
+        (a * dot(u, difference), b * dot(v, difference), c * dot(w, difference)),
+        variance,
+        3,
+    )

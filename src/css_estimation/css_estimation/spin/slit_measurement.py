@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Sun angle, Sun vector and rate of one passage through the slits, with what they may be wrong by."""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, real
+from css_common.vectors import Vec3
+from css_estimation.spin import slit_angles, slit_passage
+from css_estimation.spin.slit_passage import Passage, PassageParameters
+from css_estimation.symmetric import Symmetric
+
+PARAMETERS: Table = (
+    *slit_passage.PARAMETERS,
+    real("inertia_ratio", 0.0, "-", "axial over transverse moment of inertia; 0: unknown", low=0.0, high=2.0),
+    real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4),
+    real("coning_prior_deg", 5.0, "deg", "1 sigma of the Sun angle's swing before it is known", low=0.0, high=45.0),
+)
+
+# A cut count lies half a count before the pulse, on average.
+HALF_COUNT = 0.5
+# Weight of a new sample in the mean swing: some 30 samples are remembered; the prior counts as a few.
+_WEIGHT = 0.03
+_PRIOR_SAMPLES = 3
+
+
+class SlitParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    passage: PassageParameters
+    frequency: float  # [Hz]
+    inclination: float  # [rad]
+    inertia_ratio: float
+    jitter: float  # [counts]
+    prior_variance: float  # [rad^2]
+
+
+class Swing(NamedTuple):
+    """Running mean and variance of the Sun angle [rad, rad^2]."""
+
+    samples: int
+    mean: float
+    variance: float
+
+
+class SunAngle(NamedTuple):
+    """One measurement."""
+
+    sun_b: Vec3
+    covariance: Symmetric  # of sun_b
+    angle: float  # [rad]
+    sigma: float  # [rad]
+    rate: float  # [rad/s]
+
+
+def parameters(values: Values) -> SlitParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `slits`)."""
+    return SlitParameters(
+        slit_passage.parameters(values),
+        values.slits.counter_hz,
+        math.radians(values.slits.inclination_deg),
+        values.inertia_ratio,
+        1e-6 * values.jitter_us * values.slits.counter_hz,
+        math.radians(values.coning_prior_deg) ** 2,
+    )
+
+
+def initial_swing(p: SlitParameters) -> Swing:
+    """Nothing measured."""
+    return Swing(0, 0.0, p.prior_variance)
+
+
+@kernel
+def _swung(swing: Swing, angle: float) -> Swing:
+    if swing.samples == 0:
+        return Swing(1, angle, swing.variance)
+    off = angle - swing.mean
+    weight = max(_WEIGHT, 1.0 / (swing.samples + _PRIOR_SAMPLES))
+    return Swing(swing.samples + 1, swing.mean + weight * off, swing.variance + weight * (off * off - swing.variance))
+
+
+@kernel
+def measure(p: SlitParameters, swing: Swing, passage: Passage, azimuth: float) -> tuple[Swing, SunAngle]:
+    """The measurement of a passage of a head at an azimuth [rad] around the spin axis.
+
+    Its covariance counts whole counts and jitter, and the motion of the axis during the passage as far as the swing
+    of the last Sun angles tells it.
+    """
+    angle = slit_angles.sun_angle(passage.interval, passage.turn, p.inclination)
+    rate = slit_angles.rotation_rate(passage.turn, p.frequency)
+    swing = _swung(swing, angle)
+    variance = slit_angles.counting_variance(passage.interval, passage.turn, p.inclination, p.jitter)
+    variance += slit_angles.motion_variance(angle, p.inclination, p.inertia_ratio, swing.variance)
+    azimuth_variance = (rate / p.frequency) ** 2 * (slit_angles.CUT_VARIANCE + p.jitter * p.jitter)
+    covariance = slit_angles.sun_covariance(angle, azimuth, variance, azimuth_variance)
+    return swing, SunAngle(slit_angles.sun_vector(angle, azimuth), covariance, angle, math.sqrt(variance), rate)

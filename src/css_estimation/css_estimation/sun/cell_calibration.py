@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scale and alignment of each cell as errors of the attitude filter (Springmann & Cutler 2014; O'Keefe & Schaub 2015).
+
+A cell reads C (n.s) with its scale C and its normal n = unit(n0 + a e1 + b e2), e1 and e2 across the nominal normal
+n0. What is calibrated of each cell follows the six errors of attitude and bias: C, or C, a and b. Estimated, they are
+corrected; considered, they keep their value and variance and only make the filter trust the cells less.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, choice, flag, real
+from css_common.vectors import Vec3, add, axes_across, dot, scale, unit
+from css_estimation.sun.error_covariance import CALIBRATION
+
+PARAMETERS: Table = (
+    choice(
+        "calibration.mode",
+        "off",
+        ("off", "estimate", "consider"),
+        "errors of each cell: none, estimated with the attitude, or considered as a source of error",
+    ),
+    flag("calibration.alignment", False, "besides the scale of each cell, also its two alignment angles"),
+    real("calibration.scale_sigma", 0.1, "-", "scale error at the start, 1 sigma", low=0.0, high=1.0),
+    real("calibration.alignment_sigma_deg", 2.0, "deg", "alignment error at the start, 1 sigma", low=0.0, high=30.0),
+    real("calibration.scale_walk", 1e-6, "1/sqrt(s)", "drift of each scale, 1 sigma", low=0.0, high=1.0),
+    real("calibration.alignment_walk_deg", 0.0, "deg/sqrt(s)", "drift of each angle, 1 sigma", low=0.0, high=1.0),
+    real("calibration.largest_incidence_deg", 70.0, "deg", "no calibration beyond it", low=0.0, high=90.0),
+)
+
+SCALE, TILT_1, TILT_2 = 0, 1, 2
+"""Columns of the calibration of the cells, (N, 3)."""
+
+_SMALLEST_SCALE, _LARGEST_SCALE = 0.1, 3.0
+_LARGEST_TILT = 0.5
+
+
+class CellCalibration(NamedTuple):
+    """What is calibrated, and how it errs."""
+
+    per_cell: int  # errors of each cell: 0, 1 or 3
+    estimated: bool
+    scale_variance: float
+    alignment_variance: float  # [rad^2]
+    scale_noise: float  # [1/s]
+    alignment_noise: float  # [rad^2/s]
+    least_cosine: float  # of the incidence up to which a cell calibrates
+
+
+def parameters(values: Values) -> CellCalibration:
+    """Parameters from checked values (`PARAMETERS`)."""
+    c = values.calibration
+    off = c.mode == "off"
+    return CellCalibration(
+        per_cell=0 if off else 3 if c.alignment else 1,
+        estimated=c.mode == "estimate",
+        scale_variance=0.0 if off else c.scale_sigma**2,
+        alignment_variance=0.0 if off or not c.alignment else math.radians(c.alignment_sigma_deg) ** 2,
+        scale_noise=c.scale_walk**2,
+        alignment_noise=math.radians(c.alignment_walk_deg) ** 2,
+        least_cosine=math.cos(math.radians(c.largest_incidence_deg)),
+    )
+
+
+def nominal(cells: int) -> np.ndarray:
+    """Calibration (N, 3) of cells as the mission has them."""
+    calibration = np.zeros((cells, 3))
+    calibration[:, SCALE] = 1.0
+    return calibration
+
+
+@kernel
+def initial_variance(p: CellCalibration, k: int) -> float:
+    """Variance of the k-th error of a cell."""
+    return p.scale_variance if k == SCALE else p.alignment_variance
+
+
+@kernel
+def add_drift(p: CellCalibration, covariance, dt: float) -> None:
+    """Walk of the calibration errors over `dt` [s]; considered ones have none, their variance is what it is."""
+    if not p.estimated:
+        return
+    for i in range(CALIBRATION, covariance.shape[0]):
+        k = (i - CALIBRATION) % p.per_cell
+        covariance[i, i] += dt * (p.scale_noise if k == SCALE else p.alignment_noise)
+
+
+@kernel
+def calibrated_normal(normal_b: Vec3, calibration, i: int) -> tuple[Vec3, Vec3, Vec3]:
+    """Normal of cell `i`, and the two axes across the nominal one along which it tilts."""
+    if calibration[i, TILT_1] == 0.0 and calibration[i, TILT_2] == 0.0:
+        e1, e2 = axes_across(normal_b)
+        return normal_b, e1, e2
+    e1, e2 = axes_across(normal_b)
+    tilt = add(scale(calibration[i, TILT_1], e1), scale(calibration[i, TILT_2], e2))
+    return unit(add(normal_b, tilt)), e1, e2
+
+
+@kernel
+def calibration_partials(light: float, brightness: float, e1: Vec3, e2: Vec3, sun_b: Vec3) -> Vec3:
+    """Derivatives of a cell's output to its scale and its two tilts.
+
+    Args:
+        light: predicted output of a scale of one.
+        brightness: scale times the Sun's intensity.
+    """
+    return (light, brightness * dot(e1, sun_b), brightness * dot(e2, sun_b))
+
+
+@kernel
+def correct(p: CellCalibration, calibration, correction) -> None:
+    """Applies the gathered corrections (n,) of all errors; scales and tilts stay within what a cell can have."""
+    if not p.estimated:
+        return
+    for i in range(calibration.shape[0]):
+        for k in range(p.per_cell):
+            value = calibration[i, k] + correction[CALIBRATION + p.per_cell * i + k]
+            if k == SCALE:
+                value = min(max(value, _SMALLEST_SCALE), _LARGEST_SCALE)
+            else:
+                value = min(max(value, -_LARGEST_TILT), _LARGEST_TILT)
+            calibration[i, k] = value

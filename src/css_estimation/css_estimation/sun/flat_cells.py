@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Safe-hold Sun estimator on flat-mounted cells alone (Benton, section III); its modes are in `safe_hold`."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values
+from css_estimation.sun import flat_faces, safe_hold, sun_tracking
+from css_estimation.sun.cell_layout import brightest
+from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.flat_faces import faces_of_cells, flat_heading
+from css_estimation.sun.safe_hold import MODE_FLAT, MODE_NO_SUN, CellsVerdict, finish_safe_hold
+from css_estimation.sun.sun_heading import Aiding, SunHeading
+from css_estimation.sun.sun_tracking import TrackingParameters, TrackingState, elapsed
+
+PARAMETERS: Table = (*flat_faces.PARAMETERS, *safe_hold.PARAMETERS)
+
+
+class FlatParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    faces: np.ndarray  # (N,) face of each cell
+    tracking: TrackingParameters
+
+
+def parameters(values: Values) -> FlatParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
+    return FlatParameters(faces_of_cells(values), sun_tracking.parameters(values))
+
+
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values, one message each."""
+    return flat_faces.conflicts(values)
+
+
+def initial_state(p: FlatParameters) -> TrackingState:
+    """No estimate yet."""
+    return sun_tracking.initial_state()
+
+
+@kernel
+def step(
+    p: FlatParameters,
+    state: TrackingState,
+    dt: float,
+    voltages,
+    aiding: Aiding,
+    eclipse_predicted: int,
+) -> tuple[TrackingState, SunHeading]:
+    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    dt = elapsed(dt)
+    top = brightest(voltages)
+    largest = voltages[top] if top >= 0 else 0.0
+    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, eclipse_predicted)
+    sun_b, mask = flat_heading(p.faces, voltages)
+    verdict = CellsVerdict(sun_b, mask, MODE_FLAT if mask != 0 else MODE_NO_SUN, False)
+    return finish_safe_hold(p.tracking, state, dt, aiding, shadow, verdict)

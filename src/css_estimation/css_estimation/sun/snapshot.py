@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What estimators share that make each heading of the cells of one cycle alone: gate, and what to do in the dark."""
+
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, flag
+from css_common.vectors import Vec3
+from css_estimation.sun import lit_cells, sun_tracking
+from css_estimation.sun.cell_layout import CellLayout, cell_layout
+from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.lit_cells import Gate
+from css_estimation.sun.sun_heading import VALIDITY_NONE, VALIDITY_VALID, Aiding, Covariance, SunHeading
+from css_estimation.sun.sun_tracking import (
+    Estimate,
+    TrackingParameters,
+    TrackingState,
+    elapsed,
+    finish_cycle,
+    gyro_usable,
+    turned_sun,
+)
+
+PARAMETERS: Table = (
+    *lit_cells.PARAMETERS,
+    flag("propagate_held", True, "without Sun, turn the held vector with the gyro"),
+    *sun_tracking.PARAMETERS,
+)
+
+MODE_NO_SUN = 0
+
+
+class SnapshotParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    layout: CellLayout
+    gate: Gate
+    propagate_held: bool
+    tracking: TrackingParameters
+
+
+class Snapshot(NamedTuple):
+    """What the cells of one cycle say."""
+
+    sun_b: Vec3  # unit vector; zeros without a Sun
+    covariance: Covariance
+    lit_mask: int
+    mode: int  # MODE_NO_SUN, or another number that is the estimator's own
+
+
+def parameters(values: Values) -> SnapshotParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
+    return SnapshotParameters(
+        layout=cell_layout(values),
+        gate=lit_cells.gate(values),
+        propagate_held=values.propagate_held,
+        tracking=sun_tracking.parameters(values),
+    )
+
+
+@kernel
+def finish_snapshot(
+    p: SnapshotParameters,
+    state: TrackingState,
+    dt: float,
+    voltages,
+    top: int,
+    aiding: Aiding,
+    eclipse_predicted: int,
+    snapshot: Snapshot,
+) -> tuple[TrackingState, SunHeading]:
+    """The rest of a cycle: without a Sun the last heading is held, or turned with the gyro.
+
+    Args:
+        top: result of `brightest`.
+        others: as in `css_estimation.sun.sun_heading`.
+    """
+    dt = elapsed(dt)
+    gyro_ok = gyro_usable(p.tracking, aiding)
+    valid = snapshot.mode != MODE_NO_SUN
+    sun_b = snapshot.sun_b
+    if not valid and state.validity != VALIDITY_NONE:
+        sun_b = state.sun_b
+        if p.propagate_held and gyro_ok:
+            sun_b = turned_sun(sun_b, aiding.gyro_b, dt)
+    restarted = state.validity != VALIDITY_VALID
+    estimate = Estimate(sun_b, snapshot.covariance, valid, False, restarted, 0.0, 0, snapshot.lit_mask, snapshot.mode)
+    largest = voltages[top] if top >= 0 else 0.0
+    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, eclipse_predicted)
+    return finish_cycle(p.tracking, state, dt, aiding, gyro_ok, shadow, estimate)

@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Sun estimator as a component of the graph; a node file only names the algorithm."""
+
+from collections.abc import Mapping
+from types import ModuleType
+from typing import ClassVar
+
+from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
+from css_common.kernel import typed_call
+from css_common.schema import Values
+from css_common.sensor_inputs import field_input, gyro_input
+from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields
+from css_estimation.sun.eclipse_prediction import EclipsePrediction
+from css_estimation.sun.low_pass import low_pass_gain
+from css_estimation.sun.mode_log import ModeLog
+from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN, Aiding
+from css_msgs.msg import SunEstimate
+
+
+class SunEstimator(Component):
+    """Cell outputs and, while they deliver, gyro and magnetometer in; `<node name>/sun_estimate` out.
+
+    Class attributes:
+        algorithm: module of the shape that `css_estimation.sun.sun_heading` describes.
+        mode_names: names of its modes, if changes between them are worth a line in the log.
+    """
+
+    shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "magnetometer")
+    algorithm: ClassVar[ModuleType]
+    mode_names: ClassVar[Mapping[int, str]] = {}
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        inputs = [
+            cells_input(values),
+            gyro_input(values),
+        ]
+        if values.rate.use_field:
+            inputs.append(field_input(values))
+        return tuple(inputs)
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("estimate", f"{name}/sun_estimate", SunEstimate, ends_cycle=True),)
+
+    @classmethod
+    def smoothing(cls, values: Values) -> Smoothing:
+        # in plain Python: loading the compiled one takes a second that a check before the flight need not wait for
+        heading_gain = getattr(cls.algorithm, "heading_gain", None)
+        return Smoothing(
+            rate=low_pass_gain.py_func(values.rate.cutoff, values.mission.period),
+            heading=1.0 if heading_gain is None else heading_gain(values),
+        )
+
+    def configure(self) -> None:
+        self._parameters = self.algorithm.parameters(self.values)
+        self._state = self.algorithm.initial_state(self._parameters)
+        self._step = typed_call(self.algorithm.step)
+        self._last_stamp_ns: int | None = None
+        self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
+        sensors_decide = self.values.eclipse.source == "sensors"
+        self._prediction = None if sensors_decide else EclipsePrediction(self.values)
+
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._parameters = self.algorithm.parameters(values)
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        self._last_stamp_ns = stamp_ns
+        cells = received["cells"]
+        assert cells is not None  # a required input
+        aiding = Aiding(*gyro_reading(received["gyro"]), *field_reading(received.get("field")))
+        predicted = PREDICTION_UNKNOWN if self._prediction is None else self._prediction.at(stamp_ns)
+        self._state, heading = self._step(
+            self._parameters,
+            self._state,
+            since_ns / 1e9,
+            cells.voltages,
+            aiding,
+            predicted,
+        )
+        if self._mode_log is not None:
+            line = self._mode_log.line(stamp_ns, heading.mode)
+            if line is not None:
+                self.report(line)
+        return {"estimate": self.message("estimate", stamp_ns, **sun_estimate_fields(heading))}

@@ -1,0 +1,252 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Extended Kalman filter on the Sun direction (O'Keefe & Schaub 2013, Eqs. 3-14).
+
+State: the unit vector sun_b; continuous propagation with the body rate, one scalar update a cell in Joseph
+form.
+
+Which cells enter decides whether the filter works. Used are the cells that the propagated estimate puts in
+the Sun's view, whatever they read (a dark one says where the Sun is not), and those brighter than a gate
+relative to the brightest. A cell in neither class may be lit by the Earth alone, and is left out.
+
+Missing cells (NaN). A dark cell by itself says that the Sun is not in front of it; that it is just beside takes a cell
+that looks the other way and is dark too. Where that one is missing, the dark one is left out.
+
+Norm. The paper says nothing about the length of the state. Here it is set to one after each cycle, and the
+covariance is told so: tangent variance stays, variance along the Sun line becomes what tangent errors leave
+there, e^2/2, whose second moment is trace^2/2. Far from convergence the filter so stays the linear one that
+finds the Sun from anywhere; once converged it is consistent on the two axes that exist.
+
+Darkness. Without light the filter only propagates. Without gyro too, nothing is known about the motion: a
+larger process noise says so, and a state less certain than a fresh one is replaced at the next light.
+
+Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 tracking, 3 propagating with a
+measured rate, 4 propagating without one.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values, choice, real
+from css_common.vectors import Vec3
+from css_estimation.sun import sun_tracking
+from css_estimation.sun.cell_layout import READABLE, CellLayout, brightest, cell_layout, is_opposed, missing_cells, sees
+from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.lit_cells import Gate
+from css_estimation.sun.snapshot import MODE_NO_SUN
+from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
+from css_estimation.sun.sun_tracking import (
+    Estimate,
+    TrackingParameters,
+    TrackingState,
+    elapsed,
+    finish_cycle,
+    gyro_usable,
+)
+from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
+from css_estimation.sun.wavg import weighted_average
+from css_estimation.symmetric import Symmetric, isotropic, row_major, trace
+
+PARAMETERS: Table = (
+    real(
+        "gate",
+        0.4,
+        "-",
+        "share of the brightest cell above which a cell is used",
+        low=0.0,
+        high=1.0,
+        tunable=True,
+    ),
+    real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True),
+    real(
+        "cell_sigma",
+        0.1,
+        "-",
+        "cell error, all causes, 1 sigma",
+        low=0.0,
+        open_low=True,
+        high=10.0,
+        tunable=True,
+    ),
+    real(
+        "process_sigma",
+        0.01,
+        "rad/sqrt(s)",
+        "drift of the Sun line, 1 sigma",
+        low=0.0,
+        high=10.0,
+        tunable=True,
+    ),
+    real(
+        "process_sigma_without_rate",
+        0.1,
+        "rad/sqrt(s)",
+        "the same while no rate is measured, 1 sigma",
+        low=0.0,
+        high=10.0,
+        tunable=True,
+    ),
+    real("initial_sigma", 1.0, "rad", "error of the start, 1 sigma", low=0.0, open_low=True, high=2.0),
+    real("largest_variance", 4.0, "rad^2", "cap on the diagonal of the covariance", low=0.01, high=100.0),
+    choice(
+        "propagate_with",
+        "measured",
+        ("measured", "filtered"),
+        "gyro rate as measured, or as low-pass filtered",
+    ),
+    *sun_tracking.PARAMETERS,
+)
+
+MODE_WAITING = 0
+MODE_STARTED = 1
+MODE_TRACKING = 2
+MODE_PROPAGATING = 3
+MODE_COASTING = 4
+
+# A reading above twice the normal Sun is a fault: it must not throw the state to where rounding rules.
+_LARGEST_READING = 2.0
+
+
+class EkfParameters(NamedTuple):
+    """Built by `parameters`; variances in rad^2, process noise in rad^2/s."""
+
+    layout: CellLayout
+    gate: Gate
+    cell_variance: float
+    process_noise: float
+    process_noise_without_rate: float
+    initial_variance: float
+    largest_variance: float
+    propagate_filtered: bool
+    tracking: TrackingParameters
+
+
+class EkfState(NamedTuple):
+    """Carried from cycle to cycle; sun_b is in `tracking`."""
+
+    started: bool
+    covariance: Symmetric
+    tracking: TrackingState
+
+
+def parameters(values: Values) -> EkfParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
+    return EkfParameters(
+        layout=cell_layout(values),
+        gate=Gate(True, values.gate, values.minimum_output),
+        cell_variance=values.cell_sigma**2,
+        process_noise=values.process_sigma**2,
+        process_noise_without_rate=values.process_sigma_without_rate**2,
+        initial_variance=values.initial_sigma**2,
+        largest_variance=values.largest_variance,
+        propagate_filtered=values.propagate_with == "filtered",
+        tracking=sun_tracking.parameters(values),
+    )
+
+
+def heading_gain(values: Values) -> float:
+    """Steady gain of the filter across the Sun line at one cell's worth of information in a cycle.
+
+    P = P - P^2 / (P + R) + Q h, solved for the covariance P before an update.
+    """
+    q, r = values.process_sigma**2 * values.mission.period, values.cell_sigma**2
+    before = 0.5 * (q + math.sqrt(q * q + 4.0 * q * r))
+    return before / (before + r)
+
+
+def initial_state(p: EkfParameters) -> EkfState:
+    """Waiting for light."""
+    return EkfState(False, (p.initial_variance, 0.0, 0.0) * 2, sun_tracking.initial_state())
+
+
+@kernel
+def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float):
+    """Updates with every cell that the propagated `sun_b` or the gate selects.
+
+    Returns:
+        state (not yet of unit length), covariance, NIS, its degrees of freedom, mask of the cells used.
+    """
+    cells = p.layout.cells
+    level = p.gate.level * largest
+    predicted_b = sun_b
+    nis = 0.0
+    mask = 0
+    count = 0
+    missing = missing_cells(voltages)
+    for i in range(voltages.shape[0]):
+        v = voltages[i]
+        if not (-READABLE < v < READABLE and (v > level or sees(p.layout, i, predicted_b))):
+            continue
+        if missing != 0 and v <= level and is_opposed(p.layout, i, missing):
+            continue
+        v = min(max(v, -_LARGEST_READING), _LARGEST_READING)
+        normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
+        sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, p.cell_variance)
+        nis += q
+        mask |= 1 << i
+        count += 1
+    return sun_b, covariance, nis, count, mask
+
+
+@kernel
+def step(
+    p: EkfParameters,
+    state: EkfState,
+    dt: float,
+    voltages,
+    aiding: Aiding,
+    eclipse_predicted: int,
+) -> tuple[EkfState, SunHeading]:
+    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    dt = elapsed(dt)
+    gyro_ok = gyro_usable(p.tracking, aiding)
+    top = brightest(voltages)
+    largest = voltages[top] if top >= 0 else 0.0
+    lit = largest > p.gate.minimum_output
+
+    tracking = state.tracking
+    started = state.started
+    sun_b = tracking.sun_b
+    covariance = state.covariance
+    rate_known = gyro_ok or tracking.rate_source != RATE_NONE
+    if started:
+        rate = aiding.gyro_b if gyro_ok and not p.propagate_filtered else tracking.omega_bn_b
+        noise = p.process_noise if rate_known else p.process_noise_without_rate
+        sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
+
+    mode = MODE_PROPAGATING if rate_known else MODE_COASTING
+    restarted = False
+    nis = 0.0
+    count = 0
+    mask = 0
+    if lit:
+        mode = MODE_TRACKING
+        if not started or trace(covariance) > 3.0 * p.initial_variance:
+            average_b, _, average_mode = weighted_average(p.layout, p.gate, voltages, top)
+            if average_mode != MODE_NO_SUN:
+                sun_b = average_b
+                covariance = isotropic(p.initial_variance)
+                mode = MODE_STARTED
+                started = restarted = True
+    predicted_b = sun_b
+    if lit and started:
+        sun_b, covariance, nis, count, mask = update_cells(p, sun_b, covariance, voltages, largest)
+    if started:
+        sun_b, covariance = constrain(sun_b, predicted_b, covariance, p.largest_variance)
+    else:
+        mode = MODE_WAITING
+
+    estimate = Estimate(
+        sun_b,
+        row_major(covariance) if started else NO_COVARIANCE,
+        lit and started,
+        False,
+        restarted,
+        nis,
+        count,
+        mask,
+        mode,
+    )
+    shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, eclipse_predicted)
+    tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)
+    return EkfState(started, covariance, tracking), heading

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Weighted-average Sun heading (O'Keefe & Schaub 2013, Eq. 2).
+
+The sum runs over the cells that see the Sun, and the gate of `lit_cells` decides which these are. While it is
+relative, a scale common to all cells has no effect: the method's main virtue.
+
+Modes: 0 no Sun, 1 average of several cells, 2 a single cell (the error can reach its half view), 3
+brightest cell below an absolute gate.
+"""
+
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.schema import Table, Values
+from css_common.vectors import Vec3, norm, scale
+from css_estimation.sun import snapshot, sun_tracking
+from css_estimation.sun.cell_layout import CellLayout, brightest
+from css_estimation.sun.lit_cells import Gate, lit_cells
+from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
+from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, SunHeading
+from css_estimation.sun.sun_tracking import TrackingState
+
+PARAMETERS: Table = snapshot.PARAMETERS
+
+MODE_AVERAGE = 1
+MODE_SINGLE_CELL = 2
+MODE_BELOW_GATE = 3
+
+# Normals that cancel to less than this leave no direction.
+_NO_DIRECTION = 1e-6
+
+
+class WavgParameters(NamedTuple):
+    """Built by `parameters`."""
+
+    snapshot: SnapshotParameters
+
+
+def parameters(values: Values) -> WavgParameters:
+    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
+    return WavgParameters(snapshot.parameters(values))
+
+
+def initial_state(p: WavgParameters) -> TrackingState:
+    """No estimate yet."""
+    return sun_tracking.initial_state()
+
+
+@kernel
+def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tuple[Vec3, int, int]:
+    """Sun heading (unit, in b), mask of the cells it uses, and mode; heading zero and mode 0 without a Sun.
+
+    Args:
+        voltages: (N,) cell outputs [-]; values that are not finite count as dark.
+        top: result of `brightest`.
+    """
+    cells = layout.cells
+    lit, mask = lit_cells(gate, voltages, top)
+    if not lit:
+        return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
+    if mask == 0:
+        return (cells[top].nx, cells[top].ny, cells[top].nz), 1 << top, MODE_BELOW_GATE
+    x = y = z = 0.0
+    for i in range(voltages.shape[0]):
+        if mask >> i & 1:
+            x += voltages[i] * cells[i].nx
+            y += voltages[i] * cells[i].ny
+            z += voltages[i] * cells[i].nz
+    length = norm((x, y, z))
+    if length < _NO_DIRECTION:
+        return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
+    single = mask & (mask - 1) == 0
+    return scale(1.0 / length, (x, y, z)), mask, MODE_SINGLE_CELL if single else MODE_AVERAGE
+
+
+@kernel
+def step(
+    p: WavgParameters,
+    state: TrackingState,
+    dt: float,
+    voltages,
+    aiding: Aiding,
+    eclipse_predicted: int,
+) -> tuple[TrackingState, SunHeading]:
+    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    top = brightest(voltages)
+    sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
+    seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)
+    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)

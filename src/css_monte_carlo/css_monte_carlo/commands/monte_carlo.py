@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies many cases of a mission in a compiled loop of the nodes' own algorithms.
+
+Each case draws its initial attitude and rates, sensor errors and whatever else the mission disperses; the
+configurations share their draws. A study that was interrupted goes on where it was when the same command is given
+again, and ends with the same bytes. `fly MISSION --case K` flies one of the cases on the real graph.
+"""
+
+import argparse
+import itertools
+import json
+import re
+import signal
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from css_analysis.readable_table import ReadableTable
+from css_common import places
+from css_common.command import CommandParser, command_parser, guarded
+from css_common.mission import Mission, load_mission
+from css_common.mission_file import MissionError
+from css_monte_carlo.mission_flight import refuse_uncovered
+from css_monte_carlo.progress import progress_bar
+from css_monte_carlo.schedulers import DaskScheduler
+from css_monte_carlo.study import Configuration, Study, run_study
+from css_monte_carlo.study_folder import StudyError
+from css_monte_carlo.study_summary import study_object
+
+_EXAMPLES = (
+    "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
+    "okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2",
+    "okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786",
+)
+_NOTES = """\
+Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
+percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for."""
+
+
+def _parser() -> CommandParser:
+    parser = command_parser("css_monte_carlo", "monte_carlo", __doc__, _EXAMPLES, notes=_NOTES)
+    add = parser.add_argument
+    add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
+    add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
+    add("--first-case", type=int, default=0, metavar="K", help="number of the first case (default: 0)")
+    add("--estimators", nargs="+", metavar="NAME", help="Sun estimators to fly (default: the mission's)")
+    add("--gyro", nargs="+", choices=("on", "off"), default=["on"], help="fly with the gyro, without, or both")
+    add("--duration", type=float, metavar="S", help="simulated time of a flight [s] (default: the mission's)")
+    add("--seed", type=int, metavar="N", help="key of all random streams (default: the mission's)")
+    add("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter")
+    add(
+        "--sweep",
+        action="append",
+        default=[],
+        metavar="KEY=V1,V2,...",
+        help="fly every value of a parameter; several sweeps combine",
+    )
+    add("--sample", type=float, default=1.0, metavar="S", help="time between percentiles [s] (default: %(default)s)")
+    add("--out", type=Path, metavar="DIR", help="folder of the study (default: studies/MISSION_TIME)")
+    add("--threads", type=int, metavar="N", help="flights at a time (default: one per processor)")
+    add("--scheduler", metavar="ADDRESS", help="dask scheduler to run on; local starts one on this machine")
+    add("--json", action="store_true", help="print the result as one JSON object on the last line")
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    # a killed terminal or `kill` end it as Ctrl-C does: finished chunks stay
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    interrupted = "interrupted; the same command with the same --out goes on from here"
+    return guarded(parser.prog, lambda: _run(options), (MissionError, StudyError), interrupted=interrupted)
+
+
+def _run(options: argparse.Namespace) -> int:
+    _refuse_bad_numbers(options)
+    overrides = list(options.overrides)
+    if options.duration is not None:
+        overrides.append(f"mission.duration={options.duration}")
+    if options.seed is not None:
+        overrides.append(f"mission.seed={options.seed}")
+    mission = load_mission(options.mission, overrides)
+    refuse_uncovered(mission)
+    configurations = _configurations(mission, options)
+    for remark in mission.remarks:
+        print(f"monte-carlo: {remark}", file=sys.stderr)
+    folder = options.out or _default_folder(mission.name)
+    messages = Console(stderr=True, highlight=False)
+    begin = time.perf_counter()
+    with progress_bar(messages) as bar:
+        part = bar.add(mission.name)
+        study = run_study(
+            mission,
+            configurations,
+            options.cases,
+            folder,
+            first_case=options.first_case,
+            sample_s=options.sample,
+            threads=options.threads,
+            progress=lambda done, total: bar.tell(part, done, total),
+            scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
+        )
+    result = study_object(study, time.perf_counter() - begin, time.process_time())
+    print_study(study, result, Console(highlight=False))
+    if options.json:
+        print(json.dumps(result, allow_nan=False))
+    return 0
+
+
+def _refuse_bad_numbers(options: argparse.Namespace) -> None:
+    limits = (
+        ("--cases", options.cases, 1, "at least 1"),
+        ("--first-case", options.first_case, 0, "at least 0"),
+        ("--threads", options.threads, 1, "at least 1"),
+    )
+    for name, value, least, expected in limits:
+        if value is not None and value < least:
+            raise StudyError(f"{name}: {value} given, expected {expected}")
+    if options.first_case + options.cases > 2**32:
+        raise StudyError(f"--cases: {options.cases} from case {options.first_case} on, expected cases below 2**32")
+    if not 0.0 < options.sample < 1e9:
+        raise StudyError(f"--sample: {options.sample:g} given, expected seconds above 0")
+
+
+def _configurations(mission: Mission, options: argparse.Namespace) -> list[Configuration]:
+    """Every estimator with every use of the gyro at every point of the sweeps."""
+    axes = []
+    for sweep in options.sweep:
+        key, _, values = sweep.partition("=")
+        points = [value.strip() for value in values.split(",") if value.strip()]
+        if not points:
+            raise StudyError(f"--sweep {sweep}: expected KEY=V1,V2,...")
+        axes.append([f"{key.strip()}={value}" for value in points])
+    estimators = options.estimators or [mission.values.graph.estimator]
+    return [
+        Configuration(estimator, gyro == "on", point)
+        for point in itertools.product(*axes)
+        for estimator in dict.fromkeys(estimators)
+        for gyro in dict.fromkeys(options.gyro)
+    ]
+
+
+def _default_folder(mission: str) -> Path:
+    return places.results("studies") / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
+
+
+_COLUMNS = (
+    ("heading_error_mean_deg", "heading\nerror\nmean\n[deg]", "{:.2f}"),
+    ("heading_error_p95_deg", "heading\nerror\n95 %\n[deg]", "{:.2f}"),
+    ("power_positive_fraction", "power\nposi-\ntive\n", "{:.1%}"),
+    ("converging_mean_s", "con-\nverging\nmean\n[s]", "{:.1f}"),
+    ("converging_max_s", "con-\nverging\nmax\n[s]", "{:.1f}"),
+    ("rate_50min_deg_s", "rate at\n50 min\n\n[deg/s]", "{:.3f}"),
+    ("rate_knowledge_50min_deg_s", "its\nerror\n\n[deg/s]", "{:.3f}"),
+)
+
+
+def print_study(study: Study, result: dict, console: Console) -> None:
+    """One table of all configurations, the values of a sweep below each other, and where the files are."""
+    console.print(_study_table(result["configurations"]))
+    if study.flown:
+        console.print(
+            f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
+            f"{result['cpu_s']:.1f} s CPU: {result['cpu_ns_per_case_step']:.0f} ns a case and step"
+        )
+    else:
+        console.print("this study was complete; nothing was flown")
+    console.print(f"study: {study.folder}", soft_wrap=True)
+
+
+def _study_table(rows: Sequence[dict]) -> ReadableTable:
+    table = ReadableTable()
+    table.add_name("estimator")
+    table.add_number("gyro")
+    for key in _swept(rows[0]):
+        table.add_number(re.sub(r"(?<=[._])", "\n", key))
+    for _, heading, _ in _COLUMNS:
+        table.add_number(heading)
+    # configurations go point by point; what one estimator makes of a sweep is read down a column
+    kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
+    for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
+        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+        table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
+    return table
+
+
+def _swept(row: dict) -> dict[str, str]:
+    """Values of a configuration by the keys that are swept."""
+    pairs = (override.partition("=") for override in row["overrides"])
+    return {key: value for key, _, value in pairs}
+
+
+if __name__ == "__main__":
+    sys.exit(main())

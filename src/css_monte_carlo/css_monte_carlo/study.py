@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Studies: many cases of a mission in several configurations, resumable, with the same bytes however they are run."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from css_common.kernel import study_hash
+from css_common.mission import Mission
+from css_common.preflight import preflight, report
+from css_monte_carlo import chunk
+from css_monte_carlo.case_table import FIGURES
+from css_monte_carlo.case_tallies import SAMPLED
+from css_monte_carlo.chunk import ChunkTask
+from css_monte_carlo.direct_flight import configured
+from css_monte_carlo.percentiles import over_cases
+from css_monte_carlo.schedulers import Scheduler, ThreadScheduler
+from css_monte_carlo.study_folder import StudyFolder
+
+CHUNK_CASES = 20
+"""Cases of one chunk: a second or two of work for an orbit."""
+
+Progress = Callable[[int, int], None]
+"""Called with cases done and cases in all."""
+
+
+class Configuration(NamedTuple):
+    """One way to fly all cases."""
+
+    estimator: str
+    gyro: bool
+    overrides: tuple[str, ...] = ()  # `key=value` on top of the mission, such as a point of a sweep
+
+    def applied(self, mission: Mission) -> Mission:
+        """The mission that it flies.
+
+        Raises:
+            MissionError: there is no such estimator or key.
+        """
+        # the estimator first: only then does the mission know its keys
+        return configured(mission, estimator=self.estimator, gyro=self.gyro).with_overrides(self.overrides)
+
+    @property
+    def columns(self) -> dict[str, Any]:
+        """What names it in the tables of a study."""
+        return {"estimator": self.estimator, "gyro": self.gyro, "overrides": " ".join(self.overrides)}
+
+
+@dataclass(frozen=True)
+class Study:
+    """A complete study.
+
+    Attributes:
+        folder: where it lies.
+        manifest: what was asked for.
+        cases: one row per configuration and case: estimator, gyro, overrides, case and `case_table.FIGURES`.
+        percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
+        cpu_s: processor time of the loop in this run, 0 for a study that was there.
+        flown: case-steps flown in this run.
+        warnings: what the checks before the flights found doubtful, in this run.
+    """
+
+    folder: Path
+    manifest: dict[str, Any]
+    cases: pa.Table
+    percentiles: pa.Table
+    cpu_s: float = 0.0
+    flown: int = 0
+    warnings: tuple[str, ...] = ()
+
+
+def read_study(folder: str | Path) -> Study:
+    """A study that lies in a folder.
+
+    Raises:
+        StudyError: it is not there, not complete or damaged.
+    """
+    return Study(Path(folder), *StudyFolder(Path(folder)).read())
+
+
+def run_study(
+    mission: Mission,
+    configurations: Iterable[Configuration],
+    cases: int,
+    folder: str | Path,
+    *,
+    first_case: int = 0,
+    sample_s: float = 1.0,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    scheduler: Scheduler | None = None,
+) -> Study:
+    """Flies cases first_case, first_case + 1, ... in every configuration; what an earlier start finished is kept.
+
+    Args:
+        mission: what flies; its case is ignored.
+        folder: a new or empty folder, or that of the same study begun before.
+        sample_s: time between samples of the percentiles [s].
+        threads: flights at a time in this process; None: one per processor.
+        progress: told after each chunk.
+        scheduler: where chunks run; None: threads of this process.
+
+    Raises:
+        MissionError: a configuration does not fit the mission, a check before the flight refuses it, or it has no
+            place in the loop.
+        StudyError: the folder cannot be used.
+    """
+    configurations = tuple(configurations)
+    missions = [configuration.applied(mission) for configuration in configurations]
+    warnings = tuple(dict.fromkeys(line for flown in missions for line in preflight(flown)))
+    report(warnings)
+    sample_every = max(1, round(sample_s / (mission.period_ns * 1e-9)))
+    store = StudyFolder(Path(folder))
+    manifest = _manifest(mission, configurations, cases, first_case, sample_every)
+    store.prepare(manifest)
+    if store.complete:
+        return replace(read_study(folder), warnings=warnings)
+    ranges = [
+        (first, min(CHUNK_CASES, first_case + cases - first))
+        for first in range(first_case, first_case + cases, CHUNK_CASES)
+    ]
+    tasks = {
+        _chunk_name(i, first, count): ChunkTask(flown.text(), flown.origin, first, count, sample_every)
+        for i, flown in enumerate(missions)
+        for first, count in ranges
+    }
+    waiting = {name: task for name, task in tasks.items() if not store.has_chunk(name)}
+    total = cases * len(configurations)
+    done = total - sum(task.cases for task in waiting.values())
+    if progress is not None:
+        progress(done, total)
+    cpu_s, flown_steps = 0.0, 0
+    with scheduler or ThreadScheduler(threads) as workers:
+        for name, flown in workers.run(waiting):
+            store.write_chunk(name, flown.data)
+            cpu_s += flown.cpu_s
+            flown_steps += waiting[name].cases * mission.steps
+            done += waiting[name].cases
+            if progress is not None:
+                progress(done, total)
+    names = [[_chunk_name(i, first, count) for first, count in ranges] for i in range(len(configurations))]
+    store.finish(
+        _merged_cases(store, configurations, names),
+        _merged_percentiles(store, configurations, names, sample_every * mission.period_ns * 1e-9),
+    )
+    return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
+
+
+def _chunk_name(configuration: int, first: int, count: int) -> str:
+    return f"{configuration:04d}-{first:010d}-{first + count - 1:010d}"
+
+
+def _manifest(
+    mission: Mission, configurations: Sequence[Configuration], cases: int, first_case: int, sample_every: int
+) -> dict[str, Any]:
+    return {
+        "format": 1,
+        "mission": mission.name,
+        "mission_text": mission.with_overrides(["mission.case=0"]).text(),
+        "first_case": first_case,
+        "cases": cases,
+        "steps": mission.steps,
+        "sample_every_steps": sample_every,
+        "configurations": [configuration.columns for configuration in configurations],
+        # results of other sources or compilers must not be mixed
+        "algorithms": study_hash(chunk.__name__),
+        "versions": {name: version(name) for name in ("numba", "numpy", "pyerfa", "ppigrf", "pyarrow")},
+    }
+
+
+def _merged_cases(store: StudyFolder, configurations: Sequence[Configuration], names: list[list[str]]) -> pa.Table:
+    columns = ["case", *FIGURES, "steps_without_estimate"]
+    tables = []
+    for configuration, chunks in zip(configurations, names, strict=True):
+        table = pa.concat_tables([store.read_chunk(name, columns) for name in chunks]).combine_chunks()
+        tables.append(_labelled(configuration, table))
+    return pa.concat_tables(tables).combine_chunks()
+
+
+def _merged_percentiles(
+    store: StudyFolder, configurations: Sequence[Configuration], names: list[list[str]], sample_s: float
+) -> pa.Table:
+    tables = []
+    for configuration, chunks in zip(configurations, names, strict=True):
+        for quantity in SAMPLED:
+            # one quantity of one configuration at a time: a study may be far larger than memory
+            rows = [store.read_chunk(name, [quantity]).column(0).combine_chunks() for name in chunks]
+            samples = np.concatenate([r.flatten().to_numpy().reshape(len(r), -1) for r in rows])
+            over = over_cases(samples)
+            length = samples.shape[1]
+            table = pa.table(
+                {
+                    "quantity": pa.array([quantity] * length),
+                    "time_s": pa.array(sample_s * np.arange(length)),
+                    "count": pa.array(over.pop("count"), pa.int64()),
+                    **{name: pa.array(values, pa.float64(), from_pandas=True) for name, values in over.items()},
+                }
+            )
+            tables.append(_labelled(configuration, table))
+    return pa.concat_tables(tables).combine_chunks()
+
+
+def _labelled(configuration: Configuration, table: pa.Table) -> pa.Table:
+    labels = {name: pa.array([value] * table.num_rows) for name, value in configuration.columns.items()}
+    return pa.table(labels | {name: table.column(name) for name in table.column_names})

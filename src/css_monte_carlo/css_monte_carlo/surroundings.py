@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What surrounds the spacecraft at each step, the same for all cases: computed once, read by every flight.
+
+A flight is cut into blocks of steps, so that the tables of one stay small however long the mission is.
+"""
+
+import threading
+from collections import OrderedDict
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.epochs import parse_utc
+from css_common.kernel import kernel, outer_kernel
+from css_common.schema import Values
+from css_environment import ephemeris
+from css_environment.albedo_vector import PATCHES, earth_light_sources
+from css_environment.earth_light import EarthView, look_at_earth, new_earth_view, new_light
+from css_environment.ephemeris import EnvironmentState, Ephemeris
+from css_environment.mission_environment import MissionEnvironment
+from css_estimation.sun.eclipse_prediction import EclipsePrediction
+from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN
+from css_sim.flight_environment import flight_environment
+
+BLOCK_STEPS = 1200
+"""Steps of one block."""
+
+_KEPT_BYTES = 192_000_000
+
+STATE = np.dtype(
+    [
+        ("r_n", np.float64, 3),
+        ("v_n", np.float64, 3),
+        ("sun_n", np.float64, 3),
+        ("field_n", np.float64, 3),
+        ("dcm_en", np.float64, 9),
+        ("solar_flux", np.float64),
+        ("illumination", np.float64),
+    ],
+    align=True,
+)
+"""`EnvironmentState` of one step."""
+
+
+class Surroundings(NamedTuple):
+    """Tables of one block of K steps."""
+
+    states: np.ndarray  # (K,) of STATE
+    predicted: np.ndarray  # (K,) what the estimator's orbit model says about the shadow
+    light: np.ndarray  # (K, 192) patches of light of the Earth; (0, 192) when each case has its own Earth, or none
+    views: EarthView  # (K, ...) the Earth seen from the orbit, for cases that sum patches of their own; else (0, ...)
+
+
+@kernel
+def state_at(states, k: int) -> EnvironmentState:
+    """The environment of a step."""
+    s = states[k]
+    d = s.dcm_en
+    return EnvironmentState(
+        (s.r_n[0], s.r_n[1], s.r_n[2]),
+        (s.v_n[0], s.v_n[1], s.v_n[2]),
+        (s.sun_n[0], s.sun_n[1], s.sun_n[2]),
+        s.solar_flux,
+        s.illumination,
+        (s.field_n[0], s.field_n[1], s.field_n[2]),
+        ((d[0], d[1], d[2]), (d[3], d[4], d[5]), (d[6], d[7], d[8])),
+    )
+
+
+@outer_kernel
+def view_at(views: EarthView, k: int) -> EarthView:
+    """The Earth as seen at a step."""
+    return EarthView(views.frame[k], views.circles[k], views.light[k], views.cell[k], views.disc[k])
+
+
+@outer_kernel
+def _tabulate_states(tables: Ephemeris, elapsed_s, states) -> None:
+    for k in range(states.shape[0]):
+        e = ephemeris.at(tables, elapsed_s[k])
+        s = states[k]
+        for i in range(3):
+            s.r_n[i], s.v_n[i], s.sun_n[i], s.field_n[i] = e.r_n[i], e.v_n[i], e.sun_n[i], e.field_n[i]
+            for j in range(3):
+                s.dcm_en[3 * i + j] = e.dcm_en[i][j]
+        s.solar_flux, s.illumination = e.solar_flux, e.illumination
+
+
+@outer_kernel
+def _tabulate_light(model: int, states, view: EarthView, reflectivity, light) -> None:
+    for k in range(states.shape[0]):
+        e = state_at(states, k)
+        earth_light_sources(model, view, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, reflectivity, light[k])
+
+
+@outer_kernel
+def _tabulate_views(states, views: EarthView, rows: int, columns: int) -> None:
+    for k in range(states.shape[0]):
+        e = state_at(states, k)
+        look_at_earth(view_at(views, k), e.r_n, e.sun_n, e.solar_flux, e.dcm_en, rows, columns)
+
+
+class SurroundingsTables:
+    """The blocks of a mission, made when they are first asked for; threads may share one.
+
+    Args:
+        plant: values of the node that owns the truth (its orbit, shadow and field).
+        estimator: values of the estimator that flies (its eclipse prediction); None: none asks for one.
+        reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
+        own_earth: each case has its own reflectivities, on a grid of that shape.
+        field: something feels the geomagnetic field.
+        albedo_model: `albedo_vector.PATCHES`, `VECTOR` or `NADIR`.
+    """
+
+    def __init__(
+        self,
+        plant: Values,
+        estimator: Values | None,
+        reflectivity: np.ndarray | None,
+        own_earth: bool = False,
+        field: bool = True,
+        albedo_model: int = PATCHES,
+    ) -> None:
+        self._environment: MissionEnvironment = flight_environment(plant, field)
+        self._prediction: EclipsePrediction | None = None
+        if estimator is not None and estimator.eclipse.source != "sensors":
+            self._prediction = EclipsePrediction(estimator)
+        self._period_ns = round(plant.mission.period * 1e9)
+        self._epoch_ns = parse_utc(plant.mission.epoch)
+        self._reflectivity = reflectivity
+        self._own_earth = own_earth
+        self._albedo_model = albedo_model
+        self._blocks: OrderedDict[tuple[int, int], Surroundings] = OrderedDict()
+        self._bytes = 0
+        self._lock = threading.Lock()
+
+    def block(self, first: int, count: int) -> Surroundings:
+        """The tables of `count` steps from step `first` on."""
+        key = (first, count)
+        with self._lock:
+            if key in self._blocks:
+                self._blocks.move_to_end(key)
+                return self._blocks[key]
+            block = self._make(first, count)
+            self._blocks[key] = block
+            self._bytes += _size(block)
+            while self._bytes > _KEPT_BYTES and len(self._blocks) > 1:
+                self._bytes -= _size(self._blocks.popitem(last=False)[1])
+            return block
+
+    def states(self, first: int, count: int) -> np.ndarray:
+        """(K,) of STATE for `count` steps from step `first` on."""
+        states = np.zeros(count, STATE)
+        elapsed_s = (first + np.arange(count)) * self._period_ns * 1e-9
+        segments = np.floor(elapsed_s / ephemeris.SEGMENT_S)
+        for segment in np.unique(segments):
+            part = segments == segment
+            rows = slice(int(np.argmax(part)), int(np.argmax(part)) + int(np.count_nonzero(part)))
+            _tabulate_states(self._environment.tables(elapsed_s[rows.start]), elapsed_s[rows], states[rows])
+        return states
+
+    def _make(self, first: int, count: int) -> Surroundings:
+        states = self.states(first, count)
+        predicted = np.full(count, PREDICTION_UNKNOWN, np.int64)
+        if self._prediction is not None:
+            for k in range(count):
+                predicted[k] = self._prediction.at(self._epoch_ns + (first + k) * self._period_ns)
+        grid = self._reflectivity
+        has_light = grid is not None and not self._own_earth
+        light = aligned_table(count if has_light else 0, len(new_light()))
+        has_views = grid is not None and self._own_earth and self._albedo_model == PATCHES
+        views = _views(count if has_views else 0)
+        if grid is not None and has_views:
+            _tabulate_views(states, views, *grid.shape)
+        elif grid is not None and has_light:
+            _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
+        return Surroundings(states, predicted, light, views)
+
+
+def aligned_table(rows: int, columns: int) -> np.ndarray:
+    """Zeros (rows, columns) float32 whose rows begin on cache lines when a row fills whole ones."""
+    raw = np.zeros(4 * rows * columns + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + 4 * rows * columns].view(np.float32).reshape(rows, columns)
+
+
+def _views(count: int) -> EarthView:
+    return EarthView(*(np.zeros((count, *a.shape), a.dtype) for a in new_earth_view()))
+
+
+def _size(block: Surroundings) -> int:
+    return sum(a.nbytes for a in (block.states, block.predicted, block.light, *block.views))

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What people type after `monte-carlo`: results, and one line for what is wrong."""
+
+import json
+
+import pytest
+
+from css_monte_carlo.commands.monte_carlo import main
+
+SHORT = ["okeefe_2013", "--duration", "30", "--set", "mission.period=1.0", "--cases", "3"]
+
+
+def test_json_on_the_last_line(tmp_path, capsys):
+    folder = tmp_path / "s"
+    arguments = ["--estimators", "ekf", "wavg", "--gyro", "on", "off", "--sweep", "css_array.noise=0,0.1"]
+    assert main([*SHORT, *arguments, "--out", str(folder), "--json"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    result = json.loads(lines[-1])
+    assert list(result) == [
+        "mission",
+        "cases",
+        "steps",
+        "wall_s",
+        "cpu_s",
+        "cpu_ns_per_case_step",
+        "configurations",
+        "out",
+        "warnings",
+    ]
+    assert (result["mission"], result["cases"], result["steps"], result["out"]) == ("okeefe_2013", 3, 30, str(folder))
+    flown = [(row["estimator"], row["gyro"], *row["overrides"]) for row in result["configurations"]]
+    assert flown == [
+        (estimator, gyro, f"css_array.noise={noise}")
+        for noise in ("0", "0.1")
+        for estimator in ("ekf", "wavg")
+        for gyro in ("on", "off")
+    ]
+    assert sorted(file.name for file in folder.iterdir()) == ["cases.parquet", "percentiles.parquet", "study.json"]
+    rows = [line.split()[:3] for line in lines[:-1] if line.split()[:1] in (["ekf"], ["wavg"])]
+    assert rows == [[name, gyro, noise] for name in ("ekf", "wavg") for gyro in ("on", "off") for noise in ("0", "0.1")]
+
+
+def test_the_seed_changes_the_cases(tmp_path, capsys):
+    means = []
+    for seed in ("1", "2"):
+        assert main([*SHORT, "--seed", seed, "--out", str(tmp_path / seed), "--json"]) == 0
+        result = json.loads(capsys.readouterr().out.splitlines()[-1])
+        means.append(result["configurations"][0]["converging_mean_s"])
+    assert means[0] != means[1]
+
+
+WRONG = {
+    "mission": (["nowhere"], "mission nowhere: unknown"),
+    "key": (["--set", "ekf.gat=1"], "override ekf.gat: unknown; did you mean ekf.gate?"),
+    "swept key": (["--sweep", "css_array.nois=1,2"], "override css_array.nois: unknown; did you mean css_array.noise?"),
+    "sweep without values": (["--sweep", "css_array.noise"], "--sweep css_array.noise: expected KEY=V1,V2,..."),
+    "swept value": (["--sweep", "css_array.noise=1,x"], "override css_array.noise: 'x' given, expected a number"),
+    "estimator": (["--estimators", "kalman"], "css_estimation/kalman"),
+    "cases": (["--cases", "0"], "--cases: 0 given, expected at least 1"),
+    "first case": (["--first-case", "-1"], "--first-case: -1 given, expected at least 0"),
+    "too many cases": (["--first-case", "4294967295"], "expected cases below 2**32"),
+    "threads": (["--threads", "0"], "--threads: 0 given, expected at least 1"),
+    "sample": (["--sample", "0"], "--sample: 0 given, expected seconds above 0"),
+    "duration": (["--duration", "-5"], "mission.duration: -5.0 given, expected above 0 and at most 3.2e+07 [s]"),
+    "seed": (["--seed", "-1"], "mission.seed: -1 given, expected at least 0"),
+    "estimator with a typo": (["--estimators", "efk"], "did you mean css_estimation/ekf?"),
+    "name of a file": (["--sweep", "mission.name=../x,b"], "mission.name: '../x' given, expected a name for files"),
+    "folder": (["--out", "/proc/nowhere"], "/proc/nowhere: cannot be written"),
+}
+
+
+UNCOVERED = {
+    "cubesat_vmm": "graph.nodes has no sunpoint_control/mrp_control, a Sun estimator; fly it on the graph",
+    "esprit_2006": "graph.nodes has no css_sim/dynamics, css_sim/css_array, sunpoint_control/mrp_control, a Sun",
+}
+
+
+@pytest.mark.parametrize("mission", UNCOVERED)
+def test_mission_that_is_not_covered_is_said_before_anything_starts(mission, tmp_path, capsys):
+    for arguments in ([], ["--estimators", "ekf"], ["--gyro", "off"]):
+        assert main([mission, "--out", str(tmp_path / "s"), *arguments]) == 2
+        err = capsys.readouterr().err
+        assert f"{mission}.yaml: the Monte Carlo does not cover this mission: {UNCOVERED[mission]}" in err
+        assert err.startswith("monte_carlo: error: ") and err.count("\n") == 1
+        assert not (tmp_path / "s").exists()
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_one_line_and_code_2_for_what_is_wrong(what, tmp_path, capsys):
+    arguments, reason = WRONG[what]
+    folder = tmp_path / "s"
+    mission = [] if what == "mission" else SHORT
+    out = [] if what == "folder" else ["--out", str(folder)]
+    assert main([*mission, *out, *arguments]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("monte_carlo: error: ") and reason in err
+    assert err.count("\n") == 1
+    assert not folder.exists(), "nothing is left that looks like a study"

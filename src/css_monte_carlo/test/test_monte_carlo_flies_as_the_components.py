@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The compiled loop against the components of the nodes, called one after the other: equal at every step."""
+
+import numpy as np
+import pytest
+
+from css_common.mission import default_mission, load_mission, mission_from_text
+from css_common.mission_file import MissionError
+from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
+from css_monte_carlo.chunk import fly_cases
+from css_monte_carlo.direct_flight import fly_directly
+from css_monte_carlo.mission_flight import MissionFlight
+from css_monte_carlo.surroundings import BLOCK_STEPS
+from css_msgs.msg import SunEstimate
+
+CASES = np.array([0, 4])
+
+RODS = (
+    "graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_sim/magnetometer,css_estimation/ekf,"
+    "sunpoint_control/mrp_control"
+)
+VARIANTS = {
+    "each case has its own Earth": ("css_array.albedo.draw=per_cell",),
+    "cells with every error": (
+        "css_array.noise=0.02",
+        "css_array.scale_common_error=0.1",
+        "css_array.scale_cell_error=0.1",
+        "css_array.misalignment_deg=1.0",
+        "css_array.bias=0.01",
+        "css_array.bits=12",
+        "css_array.degradation_mode=per_cell",
+        "css_array.random_faults.count=2",
+        "css_array.random_faults.kind=mixed",
+        "css_array.random_faults.time=5.0",
+        "css_array.faults=1 noisy 0.2",
+    ),
+    "dispersed spacecraft with disturbances": (
+        "dynamics.dispersion.inertia=0.05",
+        "dynamics.dispersion.wheel_torque=0.1",
+        "dynamics.substeps=2",
+        "dynamics.disturbances.gravity_gradient=true",
+        "dynamics.disturbances.dipole=0.5,-0.2,1.0",
+        "gyro.bias_walk_deg_s=0.001",
+    ),
+    "rods that take the wheels' momentum": (
+        RODS,
+        "rods.fitted=true",
+        "magnetometer.divider=3",
+        "mrp_control.dumping.enabled=true",
+        "dynamics.initial.wheel_speed_rpm=2000",
+    ),
+    "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
+}
+
+
+def same_steps(mission):
+    """Flies the cases both ways; how many steps were compared."""
+    trace = fly_cases(MissionFlight(mission), CASES, 10, traced=True).trace
+    for case, flown in zip(CASES, trace, strict=True):
+        log = fly_directly(mission.with_overrides([f"mission.case={case}"]))
+        truth, estimate = log.having("truth"), log.estimates[mission.values.graph.estimator]
+        torque, speed = log.having("torque_command").torque, log.having("wheels").speed
+        expected = (truth.sigma_bn, truth.omega_bn_b, estimate.sun_b, estimate.omega_bn_b, torque, speed)
+        np.testing.assert_array_equal(flown, np.hstack(expected))
+    return trace.shape[1]
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_every_step_is_the_same(variant):
+    mission = default_mission().with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
+    assert same_steps(mission) == 200
+
+
+# sunrise after two minutes, and gains that then find the Sun in one
+SUNRISE = (
+    "orbit.true_anomaly_deg=43.0",
+    "mission.duration=300.0",
+    "mrp_control.gains.k=0.148",
+    "mrp_control.gains.p=0.9",
+)
+CLARK = {
+    "flat cells": ("clark_1996_flat", (), {MODE_SHADOW, MODE_FLAT}),
+    "pyramid": ("clark_1996_pyramid", (), {MODE_SHADOW, MODE_FLAT, MODE_PYRAMID}),
+    "a slower magnetometer, dumping at all times": (
+        "clark_1996_pyramid",
+        ("magnetometer.divider=4", "mrp_control.dumping.when=always"),
+        {MODE_SHADOW, MODE_FLAT, MODE_PYRAMID},
+    ),
+    "light by patches": ("clark_1996_flat", ("css_array.albedo.model=patches",), {MODE_SHADOW, MODE_FLAT}),
+    "light from nadir": (
+        "clark_1996_flat",
+        ("css_array.albedo.model=nadir", "css_array.albedo.reflectivity=constant"),
+        {MODE_SHADOW, MODE_FLAT},
+    ),
+    "a vector of each case's own Earth": (
+        "clark_1996_flat",
+        ("css_array.albedo.reflectivity=zonal", "css_array.albedo.draw=per_cell"),
+        {MODE_SHADOW, MODE_FLAT},
+    ),
+}
+
+
+@pytest.mark.parametrize("variant", CLARK)
+def test_safe_hold_is_the_same_from_the_shadow_into_the_sun(variant):
+    name, overrides, modes = CLARK[variant]
+    mission = load_mission(name, [*SUNRISE, *overrides])
+    assert same_steps(mission) == 600
+    log = fly_directly(mission)
+    estimate = log.estimates[mission.values.graph.estimator]
+    assert modes <= set(estimate.mode.tolist())
+    assert SunEstimate.RATE_FIELD in estimate.rate_source
+    assert not log.sunlit[0] and log.sunlit[-1]
+
+
+def test_the_same_over_several_blocks_and_scripted_changes():
+    events = """
+    events:
+      off: {time: 100.04, node: gyro, action: deactivate}
+      tuned: {time: 130.0, node: ekf, action: set, parameter: cell_sigma, value: 0.2}
+      failed: {time: 135.0, node: css_array, action: set, parameter: faults, value: ['2 dead']}
+      on: {time: 140.0, node: gyro, action: activate}
+    """
+    mission = mission_from_text(f"/**:\n  ros__parameters:\n    mission: {{duration: 150.0}}{events}", "scripted")
+    assert same_steps(mission) == 1500 > BLOCK_STEPS
+
+
+REFUSED = {
+    "another event": (
+        "/**: {ros__parameters: {events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
+        "scripted: events.a: the Monte Carlo switches sensors alone, here gyro; fly it on the graph",
+    ),
+    "no control": (
+        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_estimation/ekf]}}}",
+        "scripted: no node of graph.nodes is MrpControl, which the Monte Carlo needs",
+    ),
+    "two gyros": (
+        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
+        "css_sim/gyro, css_estimation/ekf, sunpoint_control/mrp_control]}}}",
+        "two",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_the_loop_has_no_place_for_is_named(case):
+    text, reason = REFUSED[case]
+    with pytest.raises(MissionError) as error:
+        MissionFlight(mission_from_text(text, "scripted"))
+    assert reason in str(error.value)
+    assert "\n" not in str(error.value)
