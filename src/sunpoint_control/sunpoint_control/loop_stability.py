@@ -32,6 +32,7 @@ _MARGIN = 2.0  # 6 dB, the gain margin usual in control engineering
 _SEARCH_STEP = 10.0**0.05
 _SEARCH_STEPS = 160  # eight decades
 _BISECTIONS = 30
+_LARGEST_GAIN = 1e6  # above it the search for the limit begins lower
 _SMALLEST_GAIN = 1e-6
 _SHOWN = 3  # digits
 
@@ -58,7 +59,11 @@ class Gains(NamedTuple):
 
 def fastest_growth(model: LoopModel, gains: Gains) -> float:
     """Largest modulus of the loop's eigenvalues: growth from cycle to cycle of its fastest mode."""
-    return float(np.max(np.abs(np.linalg.eigvals(transition(model, gains)))))
+    with np.errstate(over="ignore", invalid="ignore"):
+        cycle = transition(model, gains)
+        if not np.isfinite(cycle).all():  # gains near the largest numbers there are
+            return math.inf
+        return float(np.max(np.abs(np.linalg.eigvals(cycle))))
 
 
 def transition(model: LoopModel, gains: Gains) -> np.ndarray:
@@ -162,6 +167,8 @@ def _limits(model: LoopModel, gains: Gains, key: str) -> Iterator[tuple[float, s
     """Where the loop changes between stable and unstable when one gain moves, down and up: the limit, and in words."""
     start = getattr(gains, key) or _SMALLEST_GAIN
     stable = _is_stable(model, gains)
+    while start > _LARGEST_GAIN and _is_stable(model, gains._replace(**{key: math.sqrt(start)})) == stable:
+        start = math.sqrt(start)
     for factor in (1.0 / _SEARCH_STEP, _SEARCH_STEP):
         inside = start
         for _ in range(_SEARCH_STEPS):

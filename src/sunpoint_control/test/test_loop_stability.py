@@ -77,6 +77,9 @@ def test_modes_do_not_hang_on_the_axes():
         (Gains(100.0, 1.0, 0.0), "gains.k: 100 given, expected at most 80 "),
         (Gains(1e4, 60.0, 0.0), "gains.k: 10000 given, expected at most"),
         (Gains(0.148, 0.9, 1e5), "gains.ki: 100000 given, expected at most"),
+        (Gains(1e308, 0.9, 0.0), "gains.k: 1e+308 given, expected at most"),
+        (Gains(0.148, 1.7e308, 0.0), "gains.p: 1.7e+308 given, expected at most"),
+        (Gains(0.148, 0.9, 1e308), "gains.ki: 1e+308 given, expected at most"),
     ],
 )
 def test_gains_that_cannot_be_stable_are_refused_with_those_that_can(gains, words):
