@@ -120,8 +120,10 @@ class Flight:
         return module
 
     def _environment(self) -> None:
-        """Sun and orientation of the Earth as at the middle of the flight: over an orbit the Sun moves by 0.06 deg, and
-        a zonal Earth looks the same however it has turned."""
+        """Sun and orientation of the Earth as at the middle of the flight.
+
+        Over an orbit the Sun moves by 0.06 deg, and a zonal Earth looks the same however it has turned.
+        """
         scenario = self.scenario
         sun = messaging.SpicePlanetStateMsgPayload(PlanetName="sun", PositionVector=scenario["sun_position_n"])
         earth = messaging.SpicePlanetStateMsgPayload(PlanetName="earth", J20002Pfix=scenario["dcm_en"])
