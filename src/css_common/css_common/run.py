@@ -9,7 +9,7 @@ from css_common.mission import find_component
 
 
 def node_main(component_type: type[Component]) -> Callable[[], int]:
-    """What a node file has as its `main`, such as `main = node_main(Gyro)`."""
+    """What a node file calls its `main`."""
 
     def main(args: list[str] | None = None) -> int:
         from css_common import node_process
