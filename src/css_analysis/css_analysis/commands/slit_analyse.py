@@ -14,7 +14,6 @@ from rich.console import Console
 
 from css_analysis.readable_table import ReadableTable
 from css_analysis.slit_file import SlitFileError, read_slit_file
-from css_analysis.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure
 from css_common.command import FAILED, CommandParser, command_parser, complain, guarded
 from css_common.schema import ParameterError, Values, default_values
 from css_common.sections import SLITS, conflicts
@@ -244,6 +243,8 @@ def _write_passages(path: Path, record: SlitRecord) -> None:
 def _figures(folder: Path | None, record: SlitRecord, windows: dict[str, Coning | None]) -> list[Path]:
     if folder is None:
         return []
+    from css_analysis.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure  # matplotlib
+
     folder.mkdir(parents=True, exist_ok=True)
     known = {name: coning for name, coning in windows.items() if coning is not None}
     files = [write_rate_figure(record.passages, folder / "rate_and_sun_angle.png")]

@@ -13,7 +13,6 @@ from pathlib import Path
 from css_analysis.flight_log import read_flight
 from css_analysis.flight_metrics import estimator_runs
 from css_bringup.commands.replay import print_replay
-from css_bringup.figure_files import print_figures
 from css_bringup.flight_result import default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.options import (
@@ -78,6 +77,8 @@ def _run(arguments: argparse.Namespace) -> int:
     with still_working(f"replaying {bag}"):
         replayed = replay(bag, copy, mission, map(parse_request, _REPLAYED), {}, overwrite=arguments.overwrite)
     print_replay(replayed)
+    from css_bringup.figure_files import print_figures  # matplotlib takes a second to load, which may pass later
+
     folder = arguments.figures or bag.with_name(f"{bag.name}_figures")
     print_figures(log, folder)
     print_figures(replayed.log, folder / "replay")

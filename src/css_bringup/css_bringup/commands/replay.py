@@ -14,7 +14,6 @@ import sys
 from pathlib import Path
 
 from css_analysis.flight_summary import summary_table
-from css_bringup.figure_files import print_figures
 from css_bringup.options import complain, console, guarded
 from css_bringup.replay_bag import ReplayResult, default_replay, mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
@@ -81,6 +80,8 @@ def _run(arguments: argparse.Namespace) -> int:
         )
     print_replay(result)
     if arguments.figures:
+        from css_bringup.figure_files import print_figures  # matplotlib takes a second to load
+
         print_figures(result.log, arguments.figures)
     if arguments.json:
         print_json(result.result_object())

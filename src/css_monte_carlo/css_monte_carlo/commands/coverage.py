@@ -15,7 +15,6 @@ from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_monte_carlo.coverage import grid_of, layout_of_mission, map_cells
-from css_monte_carlo.coverage_figures import write_coverage_figures
 from css_monte_carlo.coverage_statistics import coverage_object
 from css_sim.nodes.css_array import CssArray
 
@@ -79,6 +78,8 @@ def study(mission: Mission, figures: Path | None = None) -> tuple[dict[str, Any]
     result = {"mission": mission.name, "cells": len(normals_b), **numbers}
     files = []
     if figures is not None:
+        from css_monte_carlo.coverage_figures import write_coverage_figures  # matplotlib takes a second to load
+
         files = write_coverage_figures(grid, ideal, warped, normals_b, mission.name, figures)
     return result, files
 
