@@ -105,7 +105,11 @@ class ComponentNode(LifecycleNode):
         self.edges: dict[str, Edge] = {}
         self.matcher: Matcher = None  # type: ignore[assignment]
         self._table = component_type.table()
-        self._canonical = self._declare()
+        try:
+            self._canonical = self._declare()
+        except BaseException:
+            self.destroy_node()  # nobody else will: it is handed to nobody
+            raise
         self._output_ports: dict[str, tuple] = {}
         self.subscriptions_made: list[SoleSubscription] = []
         self.refused = ""
