@@ -21,6 +21,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from Basilisk.architecture import messaging
@@ -113,7 +114,7 @@ class Flight:
         cpu_s = time.process_time() - began
         return {"steps": round(scenario["duration"] / scenario["period"]), "cpu_s": cpu_s, **self._errors()}
 
-    def _step(self, module, name: str):
+    def _step(self, module, name: str) -> Any:
         """Calls a module once a cycle, after those named before it."""
         module.ModelTag = name
         self.simulation.AddModelToTask("cycle", module)

@@ -12,6 +12,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -184,7 +185,7 @@ class ComponentNode(LifecycleNode):
         service = self._service_change_state
         inner = service.callback
 
-        def answer(request, response):
+        def answer(request, response) -> Any:
             try:
                 return inner(request, response)
             except Exception as error:

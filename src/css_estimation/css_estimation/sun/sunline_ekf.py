@@ -160,7 +160,9 @@ def initial_state(p: EkfParameters) -> EkfState:
 
 
 @kernel
-def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float):
+def update_cells(
+    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float
+) -> tuple[Vec3, Symmetric, float, int, int]:
     """Updates with every cell that the propagated `sun_b` or the gate selects.
 
     Returns:
