@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from css_analysis.flight_metrics import QUANTITIES
+from css_analysis.quantities import QUANTITIES
 from css_common import command
 from css_common.domains import DomainError
 from css_common.mission import SHARED, Mission, load_mission

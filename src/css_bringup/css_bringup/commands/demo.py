@@ -10,8 +10,8 @@ import argparse
 import sys
 from pathlib import Path
 
+from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import read_flight
-from css_analysis.flight_metrics import estimator_runs
 from css_bringup.commands.replay import print_replay
 from css_bringup.figure_files import print_figures
 from css_bringup.flight_result import default_bag
