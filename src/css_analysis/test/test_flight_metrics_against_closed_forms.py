@@ -9,9 +9,11 @@ import pytest
 from synthetic_flight import DT, columns, estimates, flight, stamps, tilted, truth
 
 from css_analysis.estimate_errors import heading_errors, rate_errors, tangent_nees
+from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import FlightLog
-from css_analysis.flight_metrics import QUANTITIES, acquisition, estimator_runs, sunlit_passes
+from css_analysis.flight_metrics import acquisition, sunlit_passes
 from css_analysis.flight_summary import criteria_failures, print_summary
+from css_analysis.quantities import QUANTITIES
 from css_common.mission import default_mission
 from css_msgs.msg import AttitudeEstimate, ControlStatus
 

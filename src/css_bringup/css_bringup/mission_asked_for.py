@@ -3,7 +3,7 @@
 
 import argparse
 
-from css_analysis.flight_metrics import QUANTITIES
+from css_analysis.quantities import QUANTITIES
 from css_bringup.options import complain
 from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError

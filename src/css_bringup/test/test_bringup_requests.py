@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from css_analysis.flight_log import read_flight
-from css_analysis.flight_metrics import QUANTITIES
+from css_analysis.quantities import QUANTITIES
 from css_bringup import options
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numba.typed
 import numpy as np
 
+from css_analysis.flight_metrics import windows_of
 from css_common.attitude import mrp_add, rotation_vector_to_mrp
 from css_common.component import Component
 from css_common.mission import Mission, MissionError, Node
@@ -116,7 +117,8 @@ class AttitudeFlight:
             traced: keep the values of every step.
         """
         steps, filters = self.mission.steps, len(self.filters)
-        tallies = new_tallies(filters, len(numbers), steps, self.mission.period_ns * 1e-9, sample_every)
+        settled = windows_of(self.mission).settled_time
+        tallies = new_tallies(filters, len(numbers), steps, self.mission.period_ns * 1e-9, sample_every, settled)
         trace = np.zeros((len(numbers), filters, steps, TRACE_COLUMNS) if traced else (len(numbers), 0, 0, 0))
         models = numba.typed.List(self._models)
         for c, number in enumerate(numbers):

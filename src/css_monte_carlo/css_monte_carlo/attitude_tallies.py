@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_analysis.flight_metrics import SETTLED_AFTER
 from css_common.attitude import mrp_angle, mrp_subtract, mrp_to_rotation_vector
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, norm, subtract
@@ -43,8 +42,10 @@ class AttitudeTallies(NamedTuple):
     work: np.ndarray  # (6, 7) room for an elimination
 
 
-def new_tallies(filters: int, cases: int, steps: int, period_s: float, sample_every: int) -> AttitudeTallies:
-    """Nothing seen yet."""
+def new_tallies(
+    filters: int, cases: int, steps: int, period_s: float, sample_every: int, settled_time: float
+) -> AttitudeTallies:
+    """Nothing seen yet; filters count as settled from `settled_time` [s] on."""
     samples = (steps + sample_every - 1) // sample_every
     totals = np.zeros((filters, cases), TALLY)
     totals["first_step"] = -1
@@ -52,7 +53,7 @@ def new_tallies(filters: int, cases: int, steps: int, period_s: float, sample_ev
         totals,
         np.zeros((filters, cases, 33), np.int64),
         np.full((filters, cases, len(SAMPLED), samples), np.nan, np.float32),
-        math.ceil(SETTLED_AFTER / period_s - 1e-9),
+        math.ceil(settled_time / period_s - 1e-9),
         sample_every,
         np.zeros((6, 7)),
     )

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numba.typed
 import numpy as np
 
-from css_common.mission import mission_from_text
+from css_common.mission import Mission, mission_from_text
 from css_monte_carlo.case_tallies import Tallies, new_tallies
 from css_monte_carlo.loop import fly_block, trace_columns
 from css_monte_carlo.mission_flight import MissionFlight
@@ -36,11 +36,11 @@ class Flown(NamedTuple):
     cpu_s: float  # processor time of the loop, without preparation
 
 
-def flown_task(task: ChunkTask) -> tuple[np.ndarray, float, Flown]:
-    """Case numbers, control cycle [s] and flights of a task, in any process: they depend on nothing but the task."""
+def flown_task(task: ChunkTask) -> tuple[np.ndarray, Mission, Flown]:
+    """Case numbers, mission and flights of a task, in any process: they depend on nothing but the task."""
     flight = _flight_of(task.mission_text, task.origin)
     numbers = np.arange(task.first_case, task.first_case + task.cases)
-    return numbers, flight.mission.period_ns * 1e-9, fly_cases(flight, numbers, task.sample_every)
+    return numbers, flight.mission, fly_cases(flight, numbers, task.sample_every)
 
 
 @lru_cache(maxsize=2)

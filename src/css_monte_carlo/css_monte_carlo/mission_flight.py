@@ -8,6 +8,7 @@ from typing import Literal, NamedTuple, overload
 
 import numpy as np
 
+from css_analysis.flight_metrics import windows_of
 from css_common.component import Component
 from css_common.mission import Event, Mission, MissionError, Node
 from css_common.random_streams import RandomKey, random_key
@@ -118,7 +119,7 @@ class MissionFlight:
             MODELS[array.albedo.model],
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
-        self.marks = step_marks(illumination, mission.period_ns * 1e-9)
+        self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
 
     def stretches(self, cases: Cases) -> Iterator[Stretch]:
         """The stretches between scripted events, in order."""

@@ -10,11 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.flight_metrics import windows_of
+from css_analysis.quantities import study_quantities
 from css_common.kernel import study_hash
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
-from css_monte_carlo.case_table import FIGURES
 from css_monte_carlo.case_tallies import SAMPLED
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.direct_flight import configured
@@ -58,7 +59,7 @@ class Study:
     Attributes:
         folder: where it lies.
         manifest: what was asked for.
-        cases: one row per configuration and case: estimator, gyro, overrides, case and `case_table.FIGURES`.
+        cases: one row per configuration and case: estimator, gyro, overrides, case and `study_quantities`.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
@@ -145,7 +146,7 @@ def run_study(
                 progress(done, total)
     names = [[_chunk_name(i, first, count) for first, count in ranges] for i in range(len(configurations))]
     store.finish(
-        _merged_cases(store, configurations, names),
+        _merged_cases(store, configurations, missions, names),
         _merged_percentiles(store, configurations, names, sample_every * mission.period_ns * 1e-9),
     )
     return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
@@ -173,13 +174,16 @@ def _manifest(
     }
 
 
-def _merged_cases(store: StudyFolder, configurations: Sequence[Configuration], names: list[list[str]]) -> pa.Table:
-    columns = ["case", *FIGURES, "steps_without_estimate"]
+def _merged_cases(
+    store: StudyFolder, configurations: Sequence[Configuration], missions: Sequence[Mission], names: list[list[str]]
+) -> pa.Table:
     tables = []
-    for configuration, chunks in zip(configurations, names, strict=True):
+    for configuration, mission, chunks in zip(configurations, missions, names, strict=True):
+        columns = ["case", *(quantity.study_column for quantity in study_quantities(windows_of(mission)))]
         table = pa.concat_tables([store.read_chunk(name, columns) for name in chunks]).combine_chunks()
         tables.append(_labelled(configuration, table))
-    return pa.concat_tables(tables).combine_chunks()
+    # a sweep may change what is measured
+    return pa.concat_tables(tables, promote_options="default").combine_chunks()
 
 
 def _merged_percentiles(

@@ -7,17 +7,21 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from css_analysis.flight_metrics import windows_of
+from css_analysis.quantities import Summary, summaries
+from css_common.mission import mission_from_text
 from css_monte_carlo.study import Study
 
 
 def configuration_objects(study: Study) -> list[dict[str, Any]]:
     """One dictionary per configuration: means over the cases; None for what no case reached."""
+    told = summaries_of(study)
     return [
         {
             "estimator": labels["estimator"],
             "gyro": "on" if labels["gyro"] else "off",
             "overrides": labels["overrides"].split(),
-            **_figures(rows_of(study.cases, **labels)),
+            **{summary.name: _over(rows_of(study.cases, **labels), summary) for summary in told},
         }
         for labels in study.manifest["configurations"]
     ]
@@ -45,19 +49,16 @@ def rows_of(table: pa.Table, **labels: Any) -> pa.Table:
     return table
 
 
-def _figures(cases: pa.Table) -> dict[str, Any]:
-    converging = cases["converging_s"]
-    return {
-        "heading_error_mean_deg": _mean(cases, "heading_error_mean_deg"),
-        "heading_error_p95_deg": _mean(cases, "heading_error_p95_deg"),
-        "power_positive_fraction": 1.0 - cases["acquired_s"].null_count / cases.num_rows,
-        "converging_max_s": pc.max(converging).as_py(),
-        "converging_mean_s": _mean(cases, "converging_s"),
-        "rate_50min_deg_s": _mean(cases, "rate_50min_deg_s"),
-        "rate_knowledge_50min_deg_s": _mean(cases, "rate_knowledge_50min_deg_s"),
-    }
+def summaries_of(study: Study) -> tuple[Summary, ...]:
+    """What is told of the cases of a study's mission."""
+    mission = mission_from_text(study.manifest["mission_text"], str(study.folder))
+    return summaries(windows_of(mission))
 
 
-def _mean(cases: pa.Table, name: str) -> float | None:
-    values = cases[name].drop_null().to_numpy()
-    return float(np.mean(values)) if len(values) else None
+def _over(cases: pa.Table, summary: Summary) -> float | None:
+    known = cases[summary.of].drop_null().to_numpy()
+    if summary.over == "share":
+        return len(known) / cases.num_rows
+    if not len(known):
+        return None
+    return float(np.max(known) if summary.over == "max" else np.mean(known))

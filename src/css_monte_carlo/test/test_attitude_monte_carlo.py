@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from css_analysis.estimate_errors import attitude_errors
-from css_analysis.flight_metrics import estimator_runs
+from css_analysis.estimator_runs import estimator_runs
 from css_common.attitude import mrp_to_quaternion
 from css_common.mission import MissionError, load_mission
 from css_monte_carlo.attitude_flight import AttitudeFlight

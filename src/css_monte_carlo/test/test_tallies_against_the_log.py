@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_flight import estimates, flight, stamps, tilted
 
+from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import FlightLog
-from css_analysis.flight_metrics import acquisition, estimator_runs, sunlit_passes
+from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes
 from css_common.kernel import typed_call
 from css_estimation.sun.sun_heading import NO_COVARIANCE, VALIDITY_VALID, SunHeading
 from css_monte_carlo.case_table import case_table
@@ -21,6 +22,7 @@ from css_monte_carlo.case_tallies import FINAL, LATE, REPORTED, SUNLIT, new_tall
 _tally_step = typed_call(tally_step)
 UP = (0.0, 0.0, 1.0)
 STILL = (0.0, 0.0, 0.0)
+WINDOWS = Windows(settled_time=300.0, late_time=300.0, report_time=3000.0)
 OFF_DEG = 2.0  # of the estimate from the true Sun
 
 
@@ -31,12 +33,12 @@ def heading(sun_b):
 def tallied(pointing_deg, illumination, rates, period_s):
     """Row of the case table of a flight with the Sun at angles from the array normal, and rates about it [rad/s]."""
     tallies = new_tallies(1, len(pointing_deg), period_s, 10)
-    marks = step_marks(illumination, period_s)
+    marks = step_marks(illumination, period_s, WINDOWS)
     true, estimated = tilted(pointing_deg), tilted(pointing_deg + OFF_DEG)
     for step, rate in enumerate(rates.tolist()):
         sun_b, said = tuple(true[step].tolist()), heading(estimated[step].tolist())
         _tally_step(tallies, 0, step, int(marks[step]), sun_b, (0.0, 0.0, rate), UP, STILL, said)
-    (row,) = case_table(np.arange(1), tallies, period_s).to_pylist()
+    (row,) = case_table(np.arange(1), tallies, period_s, WINDOWS).to_pylist()
     return row
 
 
@@ -85,7 +87,7 @@ def test_windows_are_as_long_as_they_say(period_s):
     illumination = np.ones(steps)
     dark = slice(round(2900.0 / period_s), round(3000.0 / period_s))
     illumination[dark] = 0.4
-    marks = step_marks(illumination, period_s)
+    marks = step_marks(illumination, period_s, WINDOWS)
     elapsed = np.arange(steps) * period_s
 
     def marked(mark):
@@ -103,5 +105,5 @@ def test_windows_are_as_long_as_they_say(period_s):
 
 
 def test_a_flight_that_ends_before_fifty_minutes_reports_nothing_then():
-    assert not np.any(step_marks(np.ones(3000), 1.0) & REPORTED)
-    assert np.count_nonzero(step_marks(np.ones(3001), 1.0) & REPORTED) == 60
+    assert not np.any(step_marks(np.ones(3000), 1.0, WINDOWS) & REPORTED)
+    assert np.count_nonzero(step_marks(np.ones(3001), 1.0, WINDOWS) & REPORTED) == 60

@@ -3,8 +3,8 @@
 
 import argparse
 
+from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import read_flight
-from css_analysis.flight_metrics import estimator_runs
 from css_bringup.flight_result import default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of

@@ -3,8 +3,8 @@
 
 import argparse
 
+from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
-from css_analysis.flight_metrics import Run, estimator_runs
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
 from css_bringup.flight_result import FlightResult, default_bag

@@ -18,6 +18,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from css_analysis.quantities import Summary
 from css_analysis.readable_table import ReadableTable
 from css_common import places
 from css_common.command import CommandParser, command_parser, guarded
@@ -28,7 +29,7 @@ from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
 from css_monte_carlo.study_folder import StudyError
-from css_monte_carlo.study_summary import study_object
+from css_monte_carlo.study_summary import study_object, summaries_of
 
 _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
@@ -148,20 +149,9 @@ def _default_folder(mission: str) -> Path:
     return places.results("studies") / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
 
 
-_COLUMNS = (
-    ("heading_error_mean_deg", "heading\nerror\nmean\n[deg]", "{:.2f}"),
-    ("heading_error_p95_deg", "heading\nerror\n95 %\n[deg]", "{:.2f}"),
-    ("power_positive_fraction", "power\nposi-\ntive\n", "{:.1%}"),
-    ("converging_mean_s", "con-\nverging\nmean\n[s]", "{:.1f}"),
-    ("converging_max_s", "con-\nverging\nmax\n[s]", "{:.1f}"),
-    ("rate_50min_deg_s", "rate at\n50 min\n\n[deg/s]", "{:.3f}"),
-    ("rate_knowledge_50min_deg_s", "its\nerror\n\n[deg/s]", "{:.3f}"),
-)
-
-
 def print_study(study: Study, result: dict, console: Console) -> None:
     """One table of all configurations, the values of a sweep below each other, and where the files are."""
-    console.print(_study_table(result["configurations"]))
+    console.print(_study_table(result["configurations"], summaries_of(study)))
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
@@ -172,18 +162,18 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     console.print(f"study: {study.folder}", soft_wrap=True)
 
 
-def _study_table(rows: Sequence[dict]) -> ReadableTable:
+def _study_table(rows: Sequence[dict], columns: Sequence[Summary]) -> ReadableTable:
     table = ReadableTable()
     table.add_name("estimator")
     table.add_number("gyro")
     for key in _swept(rows[0]):
         table.add_number(re.sub(r"(?<=[._])", "\n", key))
-    for _, heading, _ in _COLUMNS:
-        table.add_number(heading)
+    for column in columns:
+        table.add_number(column.title)
     # configurations go point by point; what one estimator makes of a sweep is read down a column
     kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
     for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
-        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+        figures = ["-" if row[c.name] is None else c.form.format(row[c.name]) for c in columns]
         table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
     return table
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_analysis.flight_metrics import SETTLED_AFTER
+from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission
 from css_monte_carlo.attitude_flight import AttitudeFlight, fly_in_threads
 from css_monte_carlo.attitude_tallies import SAMPLED, AttitudeTallies
@@ -34,7 +34,7 @@ ERROR, SIGMA, _, LIT = range(len(SAMPLED))
 
 
 class Merit(NamedTuple):
-    """One filter with one set of diodes, all cases, from 300 s on; angles in deg."""
+    """One filter with one set of diodes, all cases, once settled; angles in deg."""
 
     mean: float
     p95: float
@@ -70,17 +70,17 @@ def fly(
     period_s = mission.period_ns * 1e-9
     names = flight.filters
     return Flown(
-        {name: _merit(tallies, f, period_s) for f, name in enumerate(names)},
+        {name: _merit(tallies, f, period_s, windows_of(mission).settled_time) for f, name in enumerate(names)},
         {name: tallies.samples[f] for f, name in enumerate(names)},
         period_s * tallies.sample_every,
     )
 
 
-def _merit(tallies: AttitudeTallies, f: int, period_s: float) -> Merit:
+def _merit(tallies: AttitudeTallies, f: int, period_s: float, settled_s: float) -> Merit:
     totals = tallies.totals[f]
     settled = int(totals["settled"].sum())
     errors = tallies.samples[f, :, ERROR]
-    late = errors[:, int(SETTLED_AFTER / period_s) :]
+    late = errors[:, int(settled_s / period_s) :]
     last = errors[:, -int(60.0 / period_s) :].mean(axis=1)
     return Merit(
         mean=float(totals["error_sum"].sum() / settled),
