@@ -14,6 +14,7 @@ from css_bringup import options
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
 from css_bringup.flight_result import FlightResult, default_bag
+from css_bringup.mission_asked_for import mission_of
 from css_bringup.processes import Child, Supervisor
 from css_bringup.replay_pass import parse_request
 from css_bringup.report import flight_object
@@ -79,7 +80,7 @@ def _mission_file(folder: Path, line: str) -> Path:
 def _mission_of(file: Path, *arguments: str):
     parser = argparse.ArgumentParser()
     options.add_mission_options(parser)
-    return options.mission_of(parser.parse_args([str(file), *arguments]))
+    return mission_of(parser.parse_args([str(file), *arguments]))
 
 
 def test_a_criterion_that_nobody_measures_is_refused_before_the_flight(tmp_path, capfd):
