@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 from css_common.component import INERTIAL
+from css_common.node_files import find_component
+from css_common.readme_parameters import documented, rewritten
 from css_common.schema import default_values
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.coning import Coning
@@ -19,6 +21,7 @@ from css_estimation.nodes.wls import Wls
 from sunpoint_control.nodes.mrp_control import MrpControl
 
 SOURCES = Path(__file__).parents[1] / "src"
+PACKAGES = ("css_sim", "css_estimation", "sunpoint_control")
 # component, and the parameters with which it shows all of its topics
 COMPONENTS = (
     (AttitudeFilter, {}),
@@ -46,17 +49,13 @@ def readme(kind):
     return (SOURCES / kind.__module__.split(".")[0] / "README.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("kind", [kind for kind, _ in COMPONENTS])
-def test_parameters(kind):
-    sections = {part.split("\n", 1)[0].strip(): rows(part) for part in readme(kind).split("### ")[1:]}
-    table = sections[kind.__module__.rpartition(".")[2]]
-    for parameter in kind.parameters:
-        name, default, unit, _, meaning = table.pop(parameter.name)
-        assert name.endswith("*") == parameter.tunable, parameter.name
-        assert unit == parameter.unit, parameter.name
-        assert meaning == parameter.description, parameter.name
-        if parameter.kind == "real":
-            assert float(default) == parameter.default, parameter.name
+@pytest.mark.parametrize("package", PACKAGES)
+def test_parameters_are_those_of_the_nodes(package):
+    text = (SOURCES / package / "README.md").read_text(encoding="utf-8")
+    command = "./sunpoint shell -c 'python -m css_common.readme_parameters src/*/README.md'"
+    assert rewritten(text, package) == text, f"{command} writes them anew"
+    nodes = [file.stem for file in sorted((SOURCES / package / package / "nodes").glob("[!_]*.py"))]
+    assert [node for node in nodes if find_component(package, node).parameters and node not in documented(text)] == []
 
 
 @pytest.mark.parametrize(("kind", "shown"), COMPONENTS)
