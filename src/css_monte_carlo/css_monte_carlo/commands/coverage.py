@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console
 
 from css_analysis.readable_table import ReadableTable
-from css_common.command import CommandParser, command_parser, guarded
+from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_monte_carlo.coverage import grid_of, layout_of_mission, map_cells
@@ -30,7 +30,10 @@ _EXITS = {2: "the mission or an override is wrong, or a figure cannot be written
 def _parser() -> CommandParser:
     parser = command_parser("css_monte_carlo", "coverage", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument(
-        "mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)"
+        "mission",
+        nargs="?",
+        default="okeefe_2013",
+        help=MISSION_HELP,
     )
     parser.add_argument(
         "--set",
