@@ -155,7 +155,7 @@ def private_names(tree: ast.Module) -> Iterator[str]:
     """Names that begin with an underscore and belong to somebody else."""
     own = {n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and ast.unparse(n.value) in ("self", "cls")}
     own |= {n.name for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
-    public_all_the_same = {"_replace", "_fields", "_asdict", "_exit"}
+    public_all_the_same = {"_replace", "_fields", "_asdict", "_field_defaults", "_exit"}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in ROS:
             yield from (n for n in (*node.module.split("."), *(a.name for a in node.names)) if n.startswith("_"))

@@ -5,6 +5,7 @@ import pytest
 from listing import ROOT, components, executable, with_every_flag
 
 from css_common.component import INERTIAL
+from css_common.readme_parameters import documented, rewritten
 from css_common.schema import default_values
 
 KINDS = pytest.mark.parametrize("kind", components(), ids=executable)
@@ -22,17 +23,13 @@ def readme(kind):
     return (ROOT / "src" / kind.__module__.split(".")[0] / "README.md").read_text(encoding="utf-8")
 
 
-@KINDS
-def test_parameters(kind):
-    sections = {part.split("\n", 1)[0].strip(): rows(part) for part in readme(kind).split("### ")[1:]}
-    table = sections[executable(kind)]
-    for parameter in kind.parameters:
-        name, default, unit, _, meaning = table.pop(parameter.name)
-        assert name.endswith("*") == parameter.tunable, parameter.name
-        assert unit == parameter.unit, parameter.name
-        assert meaning == parameter.description.replace("|", "/"), parameter.name
-        if parameter.kind == "real":
-            assert float(default) == parameter.default, parameter.name
+@pytest.mark.parametrize("package", sorted({kind.__module__.split(".")[0] for kind in components()}))
+def test_parameters_are_those_of_the_nodes(package):
+    text = (ROOT / "src" / package / "README.md").read_text(encoding="utf-8")
+    command = "./sunpoint shell -c 'python -m css_common.readme_parameters src/*/README.md'"
+    assert rewritten(text, package) == text, f"{command} writes them anew"
+    kinds = [kind for kind in components() if kind.__module__.split(".")[0] == package]
+    assert [executable(k) for k in kinds if k.parameters and executable(k) not in documented(text)] == []
 
 
 @KINDS

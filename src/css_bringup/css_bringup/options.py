@@ -22,7 +22,10 @@ errors = Console(stderr=True, highlight=False, markup=False)
 def add_mission_options(parser: argparse.ArgumentParser) -> None:
     """Mission name and what may be changed in it."""
     parser.add_argument(
-        "mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)"
+        "mission",
+        nargs="?",
+        default="okeefe_2013",
+        help=command.MISSION_HELP,
     )
     parser.add_argument("--case", type=int, metavar="K", help="case number: initial state and noise are drawn for it")
     parser.add_argument("--seed", type=int, metavar="N", help="key of all random streams")

@@ -28,6 +28,10 @@ class CommandParser(argparse.ArgumentParser):
         sys.exit(USAGE)
 
 
+MISSION_HELP = "name in config/ or a file, which may extend another mission (default: %(default)s)"
+"""Help of the argument that names a mission."""
+
+
 def command_parser(
     package: str,
     executable: str,

@@ -148,7 +148,7 @@ class AttitudeFlight:
     @staticmethod
     def _begun(p: AttitudeParameters, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> AttitudeParameters:
         """Parameters of a filter with its start in one case."""
-        return p._replace(given=guessed_start(key, sigma_bn, guess_deg)) if guess_deg > 0.0 else p
+        return p._replace(start=guessed_start(key, sigma_bn, guess_deg)) if guess_deg > 0.0 else p
 
     def _common_sensors(self) -> Sensors:
         array = self._array.values

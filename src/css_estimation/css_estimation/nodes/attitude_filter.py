@@ -4,6 +4,7 @@
 from collections.abc import Iterable
 
 from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.declared import merged
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
@@ -18,7 +19,7 @@ class AttitudeFilter(Component):
     """Attitude and gyro bias by a multiplicative Kalman filter; the Sun as a vector or as voltages (DiGregorio)."""
 
     shared = ("cells", "orbit", "magnetometer")
-    parameters = (*attitude_options.PARAMETERS, *flight_references.PARAMETERS)
+    parameters = merged(attitude_options.PARAMETERS, flight_references.PARAMETERS)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from css_common.command import CommandParser, command_parser, guarded, implementation
+from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
 
 _EXAMPLES = (
@@ -19,7 +19,10 @@ _EXITS = {2: "the mission or an override is wrong, or a figure cannot be written
 def _parser() -> CommandParser:
     parser = command_parser("css_monte_carlo", "coverage", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument(
-        "mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)"
+        "mission",
+        nargs="?",
+        default="okeefe_2013",
+        help=MISSION_HELP,
     )
     parser.add_argument(
         "--set",

@@ -21,7 +21,7 @@ from rich.console import Console
 from css_analysis.quantities import Summary
 from css_analysis.readable_table import ReadableTable
 from css_common import places
-from css_common.command import CommandParser, command_parser, guarded
+from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_monte_carlo.mission_flight import refuse_uncovered
@@ -44,7 +44,12 @@ percentiles.parquet (percentiles over the cases against time), beside study.json
 def _parser() -> CommandParser:
     parser = command_parser("css_monte_carlo", "monte_carlo", __doc__, _EXAMPLES, notes=_NOTES)
     add = parser.add_argument
-    add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
+    add(
+        "mission",
+        nargs="?",
+        default="okeefe_2013",
+        help=MISSION_HELP,
+    )
     add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
     add("--first-case", type=int, default=0, metavar="K", help="number of the first case (default: 0)")
     add("--estimators", nargs="+", metavar="NAME", help="Sun estimators to fly (default: the mission's)")
