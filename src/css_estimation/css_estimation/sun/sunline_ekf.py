@@ -180,7 +180,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[EkfState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, aiding)
     top = brightest(voltages)
