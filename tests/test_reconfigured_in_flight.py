@@ -25,7 +25,7 @@ def test_every_partner_of_the_plant(name):
                 assert transition() == TransitionCallbackReturn.SUCCESS
                 bench.executor.spin_once(timeout_sec=0.0)  # what is on its way comes in between
             assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
-        bench.until(lambda: plant.done, "the flight has ended", seconds=60.0)
+        bench.until(lambda: plant.done, "the flight has ended")
         assert plant.failed == ""
         assert plant.counters["partners_lost"] == 0
         assert plant.counters["cycles"] == 100

@@ -223,6 +223,17 @@ def test_size_of_a_patch_is_half_the_width_of_an_evenly_bright_square(half_width
     assert (light[X], light[Y]) == (0.0, 0.0) and light[Z] == pytest.approx(-1.0 + half_width**2 / 3.0, rel=1e-6)
 
 
+def test_light_from_a_single_direction_is_as_wide_as_the_smallest_patch():
+    """Half a degree: an edge of a cone that passes over it dims it gently."""
+    light = square_of_light(0.0)
+    assert light[SIZE] == pytest.approx(0.01)
+    edge = math.radians(60.0)
+    for inside, part in ((-1.05, 0.0), (-0.5, 0.25), (0.5, 0.75), (1.05, 1.0)):
+        angle = edge - 0.01 * inside
+        value = output(light, [[math.sin(angle), 0.0, -math.cos(angle)]], cos_half_view=0.5)[0]
+        assert value == pytest.approx(0.2 * 0.5 * part, rel=0.02, abs=1e-9)
+
+
 def test_patches_fill_the_disc_of_the_earth():
     """Seen whole and evenly lit, squares of the patches' sizes cover the solid angle that the Earth fills."""
     r = EARTH_RADIUS + 400e3
