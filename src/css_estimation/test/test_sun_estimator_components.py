@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
-from css_common.schema import checked_values, shaped_values
 from css_estimation.messages import gyro_reading
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.nodes.wavg import Wavg
@@ -22,8 +22,7 @@ OMEGA = np.array([0.01, 0.0, -0.02])
 
 
 def values_of(kind, **changes):
-    given = {name.replace("__", "."): value for name, value in changes.items()}
-    return shaped_values(kind.table(), checked_values(kind.table(), given))
+    return okeefe_values(kind.table(), **changes)
 
 
 def build(kind, **changes):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_estimation.sun import least_squares, sunline_ekf, wavg
 from css_estimation.sun.sun_heading import UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
@@ -32,7 +32,7 @@ LAYOUTS = {count: normals(count) for count in (1, 2, 8, 32)}
 
 def build(estimator, count, **changes):
     changes.setdefault("cells__clip_normal", [0.0, 0.0, 0.0])
-    p = estimator.parameters(default_values(CELLS + estimator.PARAMETERS, cells__normals=LAYOUTS[count], **changes))
+    p = estimator.parameters(okeefe_values(CELLS + estimator.PARAMETERS, cells__normals=LAYOUTS[count], **changes))
     return p, estimator.initial_state(p)
 
 

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from css_common.mission import default_mission, load_mission, mission_from_text
+from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
 from css_monte_carlo.chunk import fly_cases
@@ -67,7 +67,7 @@ def same_steps(mission):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_every_step_is_the_same(variant):
-    mission = default_mission().with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
+    mission = load_mission("okeefe_2013").with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
     assert same_steps(mission) == 200
 
 
