@@ -14,7 +14,7 @@ from css_analysis.flight_log import FlightLog
 from css_analysis.flight_metrics import acquisition, sunlit_passes
 from css_analysis.flight_summary import criteria_failures, print_summary
 from css_analysis.quantities import QUANTITIES
-from css_common.mission import default_mission
+from css_common.mission import load_mission
 from css_msgs.msg import AttitudeEstimate, ControlStatus
 
 
@@ -146,7 +146,7 @@ def test_foreign_telemetry_has_no_figures_at_all():
 def test_flight_figures_belong_to_all_estimators():
     pointing = np.concatenate([np.full(300, 60.0), np.full(900, 12.0)])
     log = flight(pointing, ekf=estimates(tilted(pointing + 1.0)), wavg=estimates(tilted(pointing + 5.0)))
-    log.mission = default_mission()
+    log.mission = load_mission("okeefe_2013")
     log.control = columns(ControlStatus, stamps(1200))
     first, second = estimator_runs(log)
     assert (first["flown"], second["flown"]) == (True, False)

@@ -20,7 +20,7 @@ from css_bringup.replay_pass import parse_request
 from css_bringup.report import flight_object
 from css_bringup.verbs import fly as fly_verb
 from css_common.command import FAILED, USAGE
-from css_common.mission import default_mission, load_mission
+from css_common.mission import load_mission
 from css_common.mission_file import MissionError
 from css_common.preflight import preflight
 
@@ -163,7 +163,7 @@ def test_unwritable_figures_are_one_line(tmp_path, capfd):
 
 
 def test_recordings_never_share_a_folder(tmp_path):
-    mission = default_mission()
+    mission = load_mission("okeefe_2013")
     first = default_bag(mission, tmp_path)
     first.mkdir()
     second = default_bag(mission, tmp_path)

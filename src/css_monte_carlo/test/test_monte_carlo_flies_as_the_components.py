@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from listing import estimators_by_mission
 
-from css_common.mission import default_mission, load_mission, mission_from_text
+from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
 from css_estimation.sun.sun_estimator import SunEstimator
@@ -69,14 +69,14 @@ def same_steps(mission):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_every_step_is_the_same(variant):
-    mission = default_mission().with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
+    mission = load_mission("okeefe_2013").with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
     assert same_steps(mission) == 200
 
 
 @pytest.mark.parametrize("estimator", estimators_by_mission(SunEstimator)["okeefe_2013"])
 @pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
 def test_every_estimator_is_the_same(estimator, gyro):
-    mission = configured(default_mission(), estimator=estimator, gyro=gyro)
+    mission = configured(load_mission("okeefe_2013"), estimator=estimator, gyro=gyro)
     assert same_steps(mission.with_overrides(["mission.duration=20.0"])) == 200
 
 

@@ -34,6 +34,10 @@ class AttitudeFilter(Component):
         return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("cells.normals", "orbit.source")
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         if values.calibration.mode != "off" and values.sun_model == "vector":
             yield f"calibration.mode: {values.calibration.mode} given, but sun_model vector calibrates no cells"

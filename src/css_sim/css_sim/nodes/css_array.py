@@ -45,6 +45,10 @@ class CssArray(Component):
         return (Output("voltages", "css/voltages", CssVoltages),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("cells.normals",)
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
