@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of merit of each case as columns, from the tallies that the loop kept."""
+"""Figures of merit of each case with a Sun estimator as columns, from the tallies that the loop kept."""
 
 import numpy as np
 import pyarrow as pa
@@ -42,25 +42,36 @@ def case_table(numbers: np.ndarray, tallies: Tallies, period_s: float) -> pa.Tab
         "converging_first_s": t["away_first"] * period_s,
         "converging_later_s": t["away_later"] * period_s,
         "acquired_s": np.where(t["acquired_step"] >= 0, t["acquired_step"] * period_s, np.nan),
-        "heading_error_mean_deg": _ratio(t["heading_sum"], t["headings"]),
+        "heading_error_mean_deg": ratio(t["heading_sum"], t["headings"]),
         "heading_error_p95_deg": np.array([percentile_of_histogram(row, 95.0) for row in tallies.histogram]),
-        "heading_error_late_deg": _ratio(t["late_sum"], t["late"]),
-        "pointing_error_mean_deg": _ratio(t["pointing_sum"], t["pointings"]),
-        "pointing_error_sunlit_deg": _ratio(t["sunlit_pointing_sum"], t["away_first"] + t["away_later"] + t["within"]),
-        "heading_error_sunlit_deg": _ratio(t["sunlit_heading_sum"], t["sunlit_headings"]),
-        "rate_final_deg_s": _ratio(t["final_sum"], t["final"]),
-        "rate_50min_deg_s": _ratio(t["reported_sum"], t["reported"]),
-        "rate_knowledge_50min_deg_s": _ratio(t["reported_knowledge_sum"], t["reported"]),
+        "heading_error_late_deg": ratio(t["late_sum"], t["late"]),
+        "pointing_error_mean_deg": ratio(t["pointing_sum"], t["pointings"]),
+        "pointing_error_sunlit_deg": ratio(t["sunlit_pointing_sum"], t["away_first"] + t["away_later"] + t["within"]),
+        "heading_error_sunlit_deg": ratio(t["sunlit_heading_sum"], t["sunlit_headings"]),
+        "rate_final_deg_s": ratio(t["final_sum"], t["final"]),
+        "rate_50min_deg_s": ratio(t["reported_sum"], t["reported"]),
+        "rate_knowledge_50min_deg_s": ratio(t["reported_knowledge_sum"], t["reported"]),
         "wheel_momentum_max": t["momentum_max"],
         "wheel_momentum_final": t["momentum"],
-        "nees_mean": _ratio(t["nees_sum"], 2 * t["consistencies"]),
-        "nis_mean": _ratio(t["nis_sum"], t["innovations"]),
+        "nees_mean": ratio(t["nees_sum"], 2 * t["consistencies"]),
+        "nis_mean": ratio(t["nis_sum"], t["innovations"]),
     }
+    return table_of(numbers, figures, t["without_estimate"], SAMPLED, tallies.samples)
+
+
+def table_of(
+    numbers: np.ndarray,
+    figures: dict[str, np.ndarray],
+    without_estimate: np.ndarray,
+    sampled: tuple[str, ...],
+    samples: np.ndarray,
+) -> pa.Table:
+    """Columns of C cases: figures (C,), NaN as null, steps without an estimate, samples (C, quantities, S) as lists."""
     columns = {"case": pa.array(numbers, pa.uint32())}
-    columns |= {name: pa.array(figures[name], pa.float64(), from_pandas=True) for name in FIGURES}
-    columns["steps_without_estimate"] = pa.array(t["without_estimate"], pa.int64())
-    for i, quantity in enumerate(SAMPLED):
-        columns[quantity] = pa.array(list(tallies.samples[:, i]), pa.list_(pa.float32()))
+    columns |= {name: pa.array(values, pa.float64(), from_pandas=True) for name, values in figures.items()}
+    columns["steps_without_estimate"] = pa.array(without_estimate, pa.int64())
+    for i, quantity in enumerate(sampled):
+        columns[quantity] = pa.array(list(samples[:, i]), pa.list_(pa.float32()))
     return pa.table(columns)
 
 
@@ -76,5 +87,6 @@ def percentile_of_histogram(counts: np.ndarray, percent: float) -> float:
     return BIN_DEG * (index + (wanted - before) / int(counts[index]))
 
 
-def _ratio(total: np.ndarray, count: np.ndarray) -> np.ndarray:
+def ratio(total: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Means (C,) of sums; NaN where nothing was counted."""
     return np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)

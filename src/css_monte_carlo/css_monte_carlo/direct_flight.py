@@ -18,12 +18,15 @@ from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
 from css_common.stepping import Stepper
+from css_estimation.nodes.attitude_filter import AttitudeFilter
 
 
 def configured(
     mission: Mission, *, case: int | None = None, estimator: str | None = None, gyro: bool = True
 ) -> Mission:
-    """A mission with another case, another estimator in the place of the one that flies, the gyro on or off.
+    """A mission with another case, another Sun estimator in the place of the one that flies, the gyro on or off.
+
+    An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then that of the filter.
 
     Raises:
         MissionError: there is no such estimator.
@@ -31,16 +34,30 @@ def configured(
     if case is not None:
         mission = mission.with_overrides([f"mission.case={case}"])
     flown = mission.values.graph.estimator
-    if estimator is not None and estimator != flown:
-        present = any(node.name == estimator for node in mission.nodes)
+    name = flown if estimator is None else estimator
+    if name != flown and not is_attitude_filter(mission, name):
+        mission = _with_estimator(mission, name)
+    mission.node(name)
+    return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
+
+
+def is_attitude_filter(mission: Mission, name: str) -> bool:
+    """Whether a node of the graph is an attitude filter."""
+    return any(node.name == name and issubclass(node.component, AttitudeFilter) for node in mission.nodes)
+
+
+def _with_estimator(mission: Mission, estimator: str) -> Mission:
+    """A mission in which another Sun estimator flies, from the graph or in the place of the one that flew."""
+    flown = mission.values.graph.estimator
+    names = [node.name for node in mission.nodes]
+    overrides = [f"graph.estimator={estimator}"]
+    if estimator not in names and flown in names:
         entry = f"{mission.node(flown).package}/{estimator}"
         nodes = [
-            entry if name == flown and not present else listed
-            for name, listed in zip((n.name for n in mission.nodes), mission.values.graph.nodes, strict=True)
+            entry if name == flown else listed for name, listed in zip(names, mission.values.graph.nodes, strict=True)
         ]
-        mission = mission.with_overrides([f"graph.nodes={','.join(nodes)}", f"graph.estimator={estimator}"])
-    name = mission.values.graph.estimator
-    return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
+        overrides.insert(0, f"graph.nodes={','.join(nodes)}")
+    return mission.with_overrides(overrides)
 
 
 def fly_directly(mission: Mission) -> FlightLog:

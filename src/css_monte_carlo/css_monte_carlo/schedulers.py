@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from typing import Any, NamedTuple, Self
 
-from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import ChunkTask, flown_task
 from css_monte_carlo.study_folder import StudyError, parquet_bytes
 
@@ -21,8 +20,8 @@ class ChunkResult(NamedTuple):
 
 def run_task(task: ChunkTask) -> ChunkResult:
     """Flies a chunk; the same bytes wherever it runs."""
-    numbers, period_s, flown = flown_task(task)
-    return ChunkResult(parquet_bytes(case_table(numbers, flown.tallies, period_s)), flown.cpu_s)
+    table, cpu_s = flown_task(task)
+    return ChunkResult(parquet_bytes(table), cpu_s)
 
 
 class Scheduler(ABC):

@@ -14,10 +14,9 @@ from css_common.kernel import study_hash
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
-from css_monte_carlo.case_table import FIGURES
-from css_monte_carlo.case_tallies import SAMPLED
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.direct_flight import configured
+from css_monte_carlo.direct_flight import configured, is_attitude_filter
+from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
 from css_monte_carlo.percentiles import over_cases
 from css_monte_carlo.schedulers import Scheduler, ThreadScheduler
 from css_monte_carlo.study_folder import StudyFolder
@@ -32,7 +31,7 @@ Progress = Callable[[int, int], None]
 class Configuration(NamedTuple):
     """One way to fly all cases."""
 
-    estimator: str
+    estimator: str  # whose estimates are measured: a Sun estimator, which controls, or an attitude filter
     gyro: bool
     overrides: tuple[str, ...] = ()  # `key=value` on top of the mission, such as a point of a sweep
 
@@ -58,7 +57,8 @@ class Study:
     Attributes:
         folder: where it lies.
         manifest: what was asked for.
-        cases: one row per configuration and case: estimator, gyro, overrides, case and `case_table.FIGURES`.
+        cases: one row per configuration and case: estimator, gyro, overrides, case and the figures of `measures`;
+            null what is not of the kind of the estimator.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
@@ -91,6 +91,7 @@ def run_study(
     *,
     first_case: int = 0,
     sample_s: float = 1.0,
+    guess_deg: float = 0.0,
     threads: int | None = None,
     progress: Progress | None = None,
     scheduler: Scheduler | None = None,
@@ -101,6 +102,8 @@ def run_study(
         mission: what flies; its case is ignored.
         folder: a new or empty folder, or that of the same study begun before.
         sample_s: time between samples of the percentiles [s].
+        guess_deg: attitude filters begin with an attitude that errs by so many degrees about each axis, 1 sigma; 0: as
+            their parameters say.
         threads: flights at a time in this process; None: one per processor.
         progress: told after each chunk.
         scheduler: where chunks run; None: threads of this process.
@@ -116,7 +119,15 @@ def run_study(
     report(warnings)
     sample_every = max(1, round(sample_s / (mission.period_ns * 1e-9)))
     store = StudyFolder(Path(folder))
+    filters = tuple(
+        dict.fromkeys(
+            c.estimator for c, m in zip(configurations, missions, strict=True) if is_attitude_filter(m, c.estimator)
+        )
+    )
     manifest = _manifest(mission, configurations, cases, first_case, sample_every)
+    # only where there is something to say: a study of Sun estimators is the same without
+    manifest |= {"attitude_filters": list(filters)} if filters else {}
+    manifest |= {"guess_deg": guess_deg} if guess_deg > 0.0 else {}
     store.prepare(manifest)
     if store.complete:
         return replace(read_study(folder), warnings=warnings)
@@ -125,8 +136,10 @@ def run_study(
         for first in range(first_case, first_case + cases, CHUNK_CASES)
     ]
     tasks = {
-        _chunk_name(i, first, count): ChunkTask(flown.text(), flown.origin, first, count, sample_every)
-        for i, flown in enumerate(missions)
+        _chunk_name(i, first, count): ChunkTask(
+            flown.text(), flown.origin, first, count, sample_every, configuration.estimator, guess_deg
+        )
+        for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
         for first, count in ranges
     }
     waiting = {name: task for name, task in tasks.items() if not store.has_chunk(name)}
@@ -143,10 +156,13 @@ def run_study(
             done += waiting[name].cases
             if progress is not None:
                 progress(done, total)
-    names = [[_chunk_name(i, first, count) for first, count in ranges] for i in range(len(configurations))]
+    parts = [
+        _Part(c, ATTITUDE if c.estimator in filters else HEADING, [_chunk_name(i, *chunk) for chunk in ranges])
+        for i, c in enumerate(configurations)
+    ]
     store.finish(
-        _merged_cases(store, configurations, names),
-        _merged_percentiles(store, configurations, names, sample_every * mission.period_ns * 1e-9),
+        _merged_cases(store, parts),
+        _merged_percentiles(store, parts, sample_every * mission.period_ns * 1e-9),
     )
     return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
 
@@ -173,23 +189,30 @@ def _manifest(
     }
 
 
-def _merged_cases(store: StudyFolder, configurations: Sequence[Configuration], names: list[list[str]]) -> pa.Table:
-    columns = ["case", *FIGURES, "steps_without_estimate"]
-    tables = []
-    for configuration, chunks in zip(configurations, names, strict=True):
-        table = pa.concat_tables([store.read_chunk(name, columns) for name in chunks]).combine_chunks()
-        tables.append(_labelled(configuration, table))
-    return pa.concat_tables(tables).combine_chunks()
+class _Part(NamedTuple):
+    """A configuration with its chunks."""
+
+    configuration: Configuration
+    measure: Measure
+    chunks: list[str]
 
 
-def _merged_percentiles(
-    store: StudyFolder, configurations: Sequence[Configuration], names: list[list[str]], sample_s: float
-) -> pa.Table:
+def _merged_cases(store: StudyFolder, parts: Sequence[_Part]) -> pa.Table:
     tables = []
-    for configuration, chunks in zip(configurations, names, strict=True):
-        for quantity in SAMPLED:
+    for part in parts:
+        columns = ["case", *part.measure.figures, "steps_without_estimate"]
+        table = pa.concat_tables([store.read_chunk(name, columns) for name in part.chunks]).combine_chunks()
+        tables.append(_labelled(part.configuration, table))
+    # nulls where configurations have different figures
+    return pa.concat_tables(tables, promote_options="default").combine_chunks()
+
+
+def _merged_percentiles(store: StudyFolder, parts: Sequence[_Part], sample_s: float) -> pa.Table:
+    tables = []
+    for part in parts:
+        for quantity in part.measure.sampled:
             # one quantity of one configuration at a time: a study may be far larger than memory
-            rows = [store.read_chunk(name, [quantity]).column(0).combine_chunks() for name in chunks]
+            rows = [store.read_chunk(name, [quantity]).column(0).combine_chunks() for name in part.chunks]
             samples = np.concatenate([r.flatten().to_numpy().reshape(len(r), -1) for r in rows])
             over = over_cases(samples)
             length = samples.shape[1]
@@ -201,7 +224,7 @@ def _merged_percentiles(
                     **{name: pa.array(values, pa.float64(), from_pandas=True) for name, values in over.items()},
                 }
             )
-            tables.append(_labelled(configuration, table))
+            tables.append(_labelled(part.configuration, table))
     return pa.concat_tables(tables).combine_chunks()
 
 

@@ -7,17 +7,19 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from css_monte_carlo.measures import ATTITUDE
 from css_monte_carlo.study import Study
 
 
 def configuration_objects(study: Study) -> list[dict[str, Any]]:
     """One dictionary per configuration: means over the cases; None for what no case reached."""
+    filters = study.manifest.get("attitude_filters", ())
     return [
         {
             "estimator": labels["estimator"],
             "gyro": "on" if labels["gyro"] else "off",
             "overrides": labels["overrides"].split(),
-            **_figures(rows_of(study.cases, **labels)),
+            **(_attitude_figures if labels["estimator"] in filters else _figures)(rows_of(study.cases, **labels)),
         }
         for labels in study.manifest["configurations"]
     ]
@@ -55,6 +57,15 @@ def _figures(cases: pa.Table) -> dict[str, Any]:
         "converging_mean_s": _mean(cases, "converging_s"),
         "rate_50min_deg_s": _mean(cases, "rate_50min_deg_s"),
         "rate_knowledge_50min_deg_s": _mean(cases, "rate_knowledge_50min_deg_s"),
+    }
+
+
+def _attitude_figures(cases: pa.Table) -> dict[str, Any]:
+    names = [name for name in ATTITUDE.figures if name != "attitude_error_max_deg"]
+    return {
+        **{name: _mean(cases, name) for name in names},
+        "attitude_error_max_deg": pc.max(cases["attitude_error_max_deg"]).as_py(),
+        "steps_without_estimate": _mean(cases, "steps_without_estimate"),
     }
 
 

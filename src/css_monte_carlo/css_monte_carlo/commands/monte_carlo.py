@@ -23,7 +23,7 @@ from css_common import places
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
-from css_monte_carlo.mission_flight import refuse_uncovered
+from css_monte_carlo.mission_flight import measured_estimators, refuse_uncovered
 from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
@@ -34,6 +34,7 @@ _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
     "okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2",
     "okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786",
+    "cubesat_vmm --cases 200 --guess 20",
 )
 _NOTES = """\
 Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
@@ -46,7 +47,13 @@ def _parser() -> CommandParser:
     add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
     add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
     add("--first-case", type=int, default=0, metavar="K", help="number of the first case (default: 0)")
-    add("--estimators", nargs="+", metavar="NAME", help="Sun estimators to fly (default: the mission's)")
+    add(
+        "--estimators",
+        nargs="+",
+        metavar="NAME",
+        help="Sun estimators or attitude filters to measure, each in flights of its own (default: the one that controls, "
+        "without control all)",
+    )
     add("--gyro", nargs="+", choices=("on", "off"), default=["on"], help="fly with the gyro, without, or both")
     add("--duration", type=float, metavar="S", help="simulated time of a flight [s] (default: the mission's)")
     add("--seed", type=int, metavar="N", help="key of all random streams (default: the mission's)")
@@ -59,6 +66,13 @@ def _parser() -> CommandParser:
         help="fly every value of a parameter; several sweeps combine",
     )
     add("--sample", type=float, default=1.0, metavar="S", help="time between percentiles [s] (default: %(default)s)")
+    add(
+        "--guess",
+        type=float,
+        default=0.0,
+        metavar="DEG",
+        help="attitude filters begin with an error of so much about each axis, 1 sigma [deg] (default: as they say)",
+    )
     add("--out", type=Path, metavar="DIR", help="folder of the study (default: studies/MISSION_TIME)")
     add("--threads", type=int, metavar="N", help="flights at a time (default: one per processor)")
     add("--scheduler", metavar="ADDRESS", help="dask scheduler to run on; local starts one on this machine")
@@ -100,6 +114,7 @@ def _run(options: argparse.Namespace) -> int:
             folder,
             first_case=options.first_case,
             sample_s=options.sample,
+            guess_deg=options.guess,
             threads=options.threads,
             progress=lambda done, total: bar.tell(part, done, total),
             scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
@@ -124,6 +139,8 @@ def _refuse_bad_numbers(options: argparse.Namespace) -> None:
         raise StudyError(f"--cases: {options.cases} from case {options.first_case} on, expected cases below 2**32")
     if not 0.0 < options.sample < 1e9:
         raise StudyError(f"--sample: {options.sample:g} given, expected seconds above 0")
+    if not 0.0 <= options.guess <= 180.0:
+        raise StudyError(f"--guess: {options.guess:g} given, expected 0 to 180 [deg]")
 
 
 def _configurations(mission: Mission, options: argparse.Namespace) -> list[Configuration]:
@@ -135,7 +152,7 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
         if not points:
             raise StudyError(f"--sweep {sweep}: expected KEY=V1,V2,...")
         axes.append([f"{key.strip()}={value}" for value in points])
-    estimators = options.estimators or [mission.values.graph.estimator]
+    estimators = options.estimators or measured_estimators(mission)
     return [
         Configuration(estimator, gyro == "on", point)
         for point in itertools.product(*axes)
@@ -159,9 +176,25 @@ _COLUMNS = (
 )
 
 
+_ATTITUDE_COLUMNS = (
+    ("first_attitude_s", "first\natti-\ntude\n[s]", "{:.1f}"),
+    ("attitude_error_mean_deg", "attitude\nerror\nmean\n[deg]", "{:.3f}"),
+    ("attitude_error_p95_deg", "attitude\nerror\n95 %\n[deg]", "{:.3f}"),
+    ("attitude_error_max_deg", "attitude\nerror\nmax\n[deg]", "{:.2f}"),
+    ("gyro_bias_error_mean_deg_s", "gyro\nbias\nerror\n[deg/s]", "{:.4f}"),
+    ("attitude_nees", "NEES\n(3)\n\n", "{:.2f}"),
+    ("attitude_bias_nees", "NEES\n(6)\n\n", "{:.2f}"),
+    ("attitude_nis", "NIS\n(1)\n\n", "{:.3f}"),
+    ("steps_without_estimate", "steps\nwithout\nesti-\nmate", "{:.1f}"),
+)
+
+
 def print_study(study: Study, result: dict, console: Console) -> None:
-    """One table of all configurations, the values of a sweep below each other, and where the files are."""
-    console.print(_study_table(result["configurations"]))
+    """A table of the configurations of each kind, the values of a sweep below each other, and where the files are."""
+    for columns in (_COLUMNS, _ATTITUDE_COLUMNS):
+        rows = [row for row in result["configurations"] if columns[1][0] in row]
+        if rows:
+            console.print(_study_table(rows, columns))
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
@@ -172,18 +205,18 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     console.print(f"study: {study.folder}", soft_wrap=True)
 
 
-def _study_table(rows: Sequence[dict]) -> ReadableTable:
+def _study_table(rows: Sequence[dict], columns: Sequence[tuple[str, str, str]]) -> ReadableTable:
     table = ReadableTable()
     table.add_name("estimator")
     table.add_number("gyro")
     for key in _swept(rows[0]):
         table.add_number(re.sub(r"(?<=[._])", "\n", key))
-    for _, heading, _ in _COLUMNS:
+    for _, heading, _ in columns:
         table.add_number(heading)
     # configurations go point by point; what one estimator makes of a sweep is read down a column
     kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
     for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
-        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in _COLUMNS]
+        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in columns]
         table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
     return table
 
