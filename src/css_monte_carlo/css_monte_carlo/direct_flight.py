@@ -26,7 +26,7 @@ def configured(
 ) -> Mission:
     """A mission with another case, another Sun estimator in the place of the one that flies, the gyro on or off.
 
-    An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then that of the filter.
+    An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then switched for it.
 
     Raises:
         MissionError: there is no such estimator.

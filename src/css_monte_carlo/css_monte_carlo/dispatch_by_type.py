@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One compiled loop for every estimator, with control or without: what is called follows from the type of its parameters.
+"""One compiled loop for every estimator, with control or without: types of parameters say what is called.
 
 A kernel that is handed to another as an argument cannot be cached on disk. The parameters of an estimator are a
 NamedTuple defined in its own module, so their type names the module whose `step` belongs to them, and the compiler

@@ -157,21 +157,19 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         light = around.light[min(k, around.light.shape[0] - 1)]
         if v.own_earth:
             light = cases.light[c]
-            if v.albedo_model == PATCHES:
-                gather_light_at(around.views, k, cases.reflectivity[c], light)
-            else:
-                e = environment
-                point_source(v.albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, cases.reflectivity[c], light)
+            _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
         read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
         if read.field_valid:
             field_b, field_step = read.field_b, step
-        heard = Aiding(read.gyro_b, read.gyro_valid, field_b, v.heading_hears_field and read.field_valid)
+        aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, v.heading_hears_field and read.field_valid)
         heading_state, heading = estimate_heading(
-            v.heading, heading_state, since_s, voltages, heard, around.predicted[k]
+            v.heading, heading_state, since_s, voltages, aiding, around.predicted[k]
         )
-        heard = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid)
+        # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
+        filtered_s = since_s if step > 0 else 0.0
+        aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid)
         attitude_state, attitude = estimate_attitude(
-            v.attitude, attitude_state, state.memory, since_s if step > 0 else 0.0, voltages, heard, around, k
+            v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
         )
         wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
         # as the control node has it: the last measurement, for as long as the next may be on its way
@@ -187,6 +185,15 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
             note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
         rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, actuators.applied)
     return rotation, heading_state, attitude_state, control_state, field_b, field_step
+
+
+@kernel
+def _own_light(albedo_model, around, k, e, reflectivity, light_out) -> None:
+    """Light of an Earth of its own (192,), written."""
+    if albedo_model == PATCHES:
+        gather_light_at(around.views, k, reflectivity, light_out)
+    else:
+        point_source(albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, reflectivity, light_out)
 
 
 @kernel

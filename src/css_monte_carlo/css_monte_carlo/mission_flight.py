@@ -4,6 +4,7 @@
 import math
 from collections.abc import Iterator
 from itertools import pairwise
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,7 +63,7 @@ _PLACES = (*_NEEDED, MrpControl, Gyro, Magnetometer, SunEstimator, AttitudeFilte
 
 
 def measured_estimators(mission: Mission) -> list[str]:
-    """Names of the estimators that a study measures unless it is told: the one that controls, or all without control."""
+    """Names of the estimators that a study measures unless told: the one that controls, or all if none does."""
     if any(issubclass(node.component, MrpControl) for node in mission.nodes):
         return [mission.values.graph.estimator]
     return [node.name for node in mission.nodes if issubclass(node.component, (SunEstimator, AttitudeFilter))]
@@ -127,8 +128,8 @@ class MissionFlight:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
         self.surroundings = SurroundingsTables(
             self._plant.values,
-            self._heading and self._heading.values,
-            self._filter and self._filter.values,
+            _values(self._heading),
+            _values(self._filter),
             common,
             self._own_earth,
             self._feels_field(),
@@ -194,7 +195,7 @@ class MissionFlight:
         )
         heading = control = None
         if self._heading is not None:
-            heading = self._heading.component.algorithm.initial_state(_parameters(self._heading, self._heading.values))
+            heading = _algorithm(self._heading).initial_state(_parameters(self._heading, self._heading.values))
         if self._control is not None:
             control = sun_pointing_control.initial_state(sun_pointing_control.parameters(self._control.values))
         states = []
@@ -210,7 +211,7 @@ class MissionFlight:
         p = _parameters(self._filter, self._filter.values)
         if guess_deg > 0.0:
             p = p._replace(given=_guessed_start(key, sigma_bn, guess_deg))
-        algorithm = self._filter.component.algorithm
+        algorithm = _algorithm(self._filter)
         return algorithm.initial_state(p), algorithm.initial_memory(p)
 
     def _estimators(self, measured: str) -> tuple[Node | None, Node | None]:
@@ -312,9 +313,20 @@ class MissionFlight:
         return shaped_values(node.component.table(), canonical)
 
 
+def _values(node: Node | None) -> Values | None:
+    return None if node is None else node.values
+
+
+def _algorithm(node: Node) -> ModuleType:
+    """The module of an estimator's node."""
+    component = node.component
+    assert issubclass(component, (SunEstimator, AttitudeFilter))
+    return component.algorithm
+
+
 def _parameters(node: Node | None, values: Values | None) -> Any:
     """Parameters of the algorithm of an estimator's node, None without the node."""
-    return None if node is None else node.component.algorithm.parameters(values)
+    return None if node is None else _algorithm(node).parameters(values)
 
 
 def _guessed_start(key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> GivenStart:

@@ -119,14 +119,11 @@ def run_study(
     report(warnings)
     sample_every = max(1, round(sample_s / (mission.period_ns * 1e-9)))
     store = StudyFolder(Path(folder))
-    filters = tuple(
-        dict.fromkeys(
-            c.estimator for c, m in zip(configurations, missions, strict=True) if is_attitude_filter(m, c.estimator)
-        )
-    )
+    named = zip(configurations, missions, strict=True)
+    filters = list(dict.fromkeys(c.estimator for c, flown in named if is_attitude_filter(flown, c.estimator)))
     manifest = _manifest(mission, configurations, cases, first_case, sample_every)
     # only where there is something to say: a study of Sun estimators is the same without
-    manifest |= {"attitude_filters": list(filters)} if filters else {}
+    manifest |= {"attitude_filters": filters} if filters else {}
     manifest |= {"guess_deg": guess_deg} if guess_deg > 0.0 else {}
     store.prepare(manifest)
     if store.complete:

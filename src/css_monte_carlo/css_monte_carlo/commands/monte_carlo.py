@@ -51,8 +51,8 @@ def _parser() -> CommandParser:
         "--estimators",
         nargs="+",
         metavar="NAME",
-        help="Sun estimators or attitude filters to measure, each in flights of its own (default: the one that controls, "
-        "without control all)",
+        help="Sun estimators, or attitude filters of the graph, each in flights of its own (default: the one that "
+        "controls, or all if none does)",
     )
     add("--gyro", nargs="+", choices=("on", "off"), default=["on"], help="fly with the gyro, without, or both")
     add("--duration", type=float, metavar="S", help="simulated time of a flight [s] (default: the mission's)")
