@@ -34,7 +34,12 @@ def attitude_table(numbers: np.ndarray, tallies: AttitudeTallies, period_s: floa
         "attitude_error_max_deg": np.where(t["settled"] > 0, t["error_max"], np.nan),
         "gyro_bias_error_mean_deg_s": ratio(t["bias_sum"], t["settled"]),
         "attitude_nees": ratio(t["nees3_sum"], t["settled"]),
-        "attitude_bias_nees": ratio(t["nees6_sum"], t["settled"]),
+        "attitude_bias_nees": _finite(ratio(t["nees6_sum"], t["settled"])),
         "attitude_nis": ratio(t["nis_sum"], t["innovations"]),
     }
     return table_of(numbers, figures, t["without_estimate"], SAMPLED, tallies.samples)
+
+
+def _finite(values: np.ndarray) -> np.ndarray:
+    # a filter that estimates no bias has no covariance of it
+    return np.where(np.isfinite(values), values, np.nan)

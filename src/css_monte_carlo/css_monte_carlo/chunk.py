@@ -15,6 +15,8 @@ import pyarrow as pa
 from css_common.mission import mission_from_text
 from css_monte_carlo.loop import fly_block
 from css_monte_carlo.mission_flight import MissionFlight
+from css_monte_carlo.mission_parts import NoPlace
+from css_monte_carlo.stepped_flight import SteppedFlight
 from css_monte_carlo.study_folder import StudyError
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_sim.flight_checks import MotionError, check_rate
@@ -46,15 +48,22 @@ def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
     """Table of a task's cases, which depends on nothing but the task, and processor time [s] of its loop."""
     flight = _flight_of(task.mission_text, task.origin, task.estimator)
     numbers = np.arange(task.first_case, task.first_case + task.cases)
-    flown = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
-    return flight.measure.table(numbers, flown.tallies, flight.mission.period_ns * 1e-9), flown.cpu_s
+    if isinstance(flight, SteppedFlight):
+        tallies, cpu_s = flight.fly(numbers, task.sample_every)
+    else:
+        tallies, _, cpu_s = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
+    return flight.measure.table(numbers, tallies, flight.mission.period_ns * 1e-9), cpu_s
 
 
 @lru_cache(maxsize=2)
-def _flight_of(mission_text: str, origin: str, estimator: str | None) -> MissionFlight:
+def _flight_of(mission_text: str, origin: str, estimator: str | None) -> MissionFlight | SteppedFlight:
     # Tables of the environment, 1 kB a step, are worth keeping from chunk to chunk. Chunks come sorted by mission, so
     # that threads work on one or two.
-    return MissionFlight(mission_from_text(mission_text, origin), estimator)
+    mission = mission_from_text(mission_text, origin)
+    try:
+        return MissionFlight(mission, estimator)
+    except NoPlace:
+        return SteppedFlight(mission, estimator)
 
 
 def fly_cases(

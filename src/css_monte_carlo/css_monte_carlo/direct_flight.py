@@ -18,7 +18,7 @@ from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
 from css_common.stepping import Stepper
-from css_estimation.nodes.attitude_filter import AttitudeFilter
+from css_monte_carlo.mission_parts import is_attitude
 
 
 def configured(
@@ -37,13 +37,15 @@ def configured(
     name = flown if estimator is None else estimator
     if name != flown and not is_attitude_filter(mission, name):
         mission = _with_estimator(mission, name)
-    mission.node(name)
+    node = mission.node(name)
+    if gyro and all(parameter.name != "use_gyro" for parameter in node.component.table()):
+        return mission
     return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
 
 
 def is_attitude_filter(mission: Mission, name: str) -> bool:
-    """Whether a node of the graph is an attitude filter."""
-    return any(node.name == name and issubclass(node.component, AttitudeFilter) for node in mission.nodes)
+    """Whether a node of the graph estimates attitude."""
+    return any(node.name == name and is_attitude(node) for node in mission.nodes)
 
 
 def _with_estimator(mission: Mission, estimator: str) -> Mission:
@@ -61,11 +63,17 @@ def _with_estimator(mission: Mission, estimator: str) -> Mission:
 
 
 def fly_directly(mission: Mission) -> FlightLog:
-    """Flies a mission to its end; the log holds what a recording of the flight would.
+    """Flies a mission to its end, after the checks before a flight; the log holds what a recording of it would.
 
     Raises:
         MissionError: the mission has no plant, or its nodes wait for each other in a circle.
     """
+    report(preflight(mission))
+    return fly_checked(mission)
+
+
+def fly_checked(mission: Mission) -> FlightLog:
+    """As `fly_directly`, for a mission that has passed the checks before a flight."""
     steps = max(mission.steps, 1)
     wires: dict[str, _Wire | _Tape] = {
         topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=False)
@@ -85,6 +93,7 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
     Raises:
         MissionError: the mission has no plant or not these topics, or its nodes wait for each other in a circle.
     """
+    report(preflight(mission))
     kept = list(topics)
     for topic in kept:
         if topic not in mission.topics:
@@ -95,7 +104,6 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
 
 
 def _fly(mission: Mission, wires: "Wires") -> None:
-    report(preflight(mission))
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
     plant.stepper.apply_due(stamp_ns)

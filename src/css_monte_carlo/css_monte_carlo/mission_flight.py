@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.attitude import mrp_add, rotation_vector_to_mrp
-from css_common.component import Component
-from css_common.mission import Event, Mission, MissionError, Node
+from css_common.mission import Event, Mission, Node
 from css_common.random_streams import RandomKey, Stream, normal4, random_key
 from css_common.schema import Values, default_values, shaped_values
 from css_common.sections import wheel_axes
@@ -26,6 +25,7 @@ from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.case_tallies import step_marks
 from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
+from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables, aligned_table
 from css_sim import (
     cell_errors,
@@ -37,16 +37,13 @@ from css_sim import (
     magnetometer,
     sun_cells,
 )
-from css_sim.nodes.css_array import CssArray
-from css_sim.nodes.dynamics import Dynamics
-from css_sim.nodes.gyro import Gyro
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
 from css_sim.spacecraft import spacecraft
 from sunpoint_control import sun_pointing_control
-from sunpoint_control.nodes.mrp_control import MrpControl
 
 _NOWHERE = (0.0, 0.0, 0.0)
+_NO_GYRO = gyro.Gyro(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Stretch(NamedTuple):
@@ -56,34 +53,6 @@ class Stretch(NamedTuple):
     end: int  # the step after the last
     vehicle: Vehicle
     cases: Cases
-
-
-_NEEDED = {Dynamics: "css_sim/dynamics", CssArray: "css_sim/css_array"}
-_PLACES = (*_NEEDED, MrpControl, Gyro, Magnetometer, SunEstimator, AttitudeFilter)
-
-
-def measured_estimators(mission: Mission) -> list[str]:
-    """Names of the estimators that a study measures unless told: the one that controls, or all if none does."""
-    if any(issubclass(node.component, MrpControl) for node in mission.nodes):
-        return [mission.values.graph.estimator]
-    return [node.name for node in mission.nodes if issubclass(node.component, (SunEstimator, AttitudeFilter))]
-
-
-def refuse_uncovered(mission: Mission) -> None:
-    """Looks whether the compiled loop has a place for a mission, before anything of it is changed.
-
-    Raises:
-        MissionError: it has none.
-    """
-    kinds = [node.component for node in mission.nodes]
-    missing = [name for kind, name in _NEEDED.items() if kind not in kinds]
-    if not any(issubclass(kind, (SunEstimator, AttitudeFilter)) for kind in kinds):
-        missing.append("a Sun estimator or attitude filter")
-    if missing:
-        raise MissionError(
-            f"{mission.origin}: the Monte Carlo does not cover this mission: graph.nodes has no {', '.join(missing)}; "
-            "fly it on the graph"
-        )
 
 
 class MissionFlight:
@@ -98,28 +67,21 @@ class MissionFlight:
     """
 
     def __init__(self, mission: Mission, estimator: str | None = None) -> None:
-        """Sorts the nodes.
+        """Prepares what all cases share.
 
         Args:
-            estimator: node whose estimates are measured, None: `graph.estimator`. A Sun estimator beside the one that
-                controls has no place.
+            estimator: node whose estimates are measured, None: `graph.estimator`.
 
         Raises:
-            MissionError: the graph has a node, or the mission an event, that the compiled loop has no place for.
+            NoPlace: the graph has a node, or the mission an event, that the compiled loop has no place for.
+            MissionError: there is no such estimator.
         """
         self.mission = mission
         self.steps = mission.steps
-        self._plant = self._needed(Dynamics)
-        self._array = self._needed(CssArray)
-        self._control = self._part(MrpControl)
-        self._gyro = self._part(Gyro)
-        self._magnetometer = self._part(Magnetometer)
-        for node in mission.nodes:
-            if not issubclass(node.component, _PLACES):
-                raise self._error(f"the Monte Carlo has no place for the node {node.name}; fly it on the graph")
-        self._heading, self._filter = self._estimators(estimator or mission.values.graph.estimator)
+        self._plant, self._array, self._control, self._gyro, self._magnetometer, self._heading, self._filter = parts_of(
+            mission, estimator
+        )
         self.measure = HEADING if self._filter is None else ATTITUDE
-        self._check_events()
         array = self._array.values
         self._own_earth = array.albedo.enabled and array.albedo.draw != "mean"
         self._grid = earth_reflectivity.source(array, mission.epoch_ns) if array.albedo.enabled else None
@@ -214,20 +176,6 @@ class MissionFlight:
         algorithm = _algorithm(self._filter)
         return algorithm.initial_state(p), algorithm.initial_memory(p)
 
-    def _estimators(self, measured: str) -> tuple[Node | None, Node | None]:
-        """The Sun estimator and the attitude filter that fly: the measured one, and the one that controls."""
-        node = self.mission.node(measured)
-        pilot = None if self._control is None else self.mission.node(self.mission.values.graph.estimator)
-        if pilot is not None and not issubclass(pilot.component, SunEstimator):
-            raise self._error(f"graph.estimator: {pilot.name} is no Sun estimator")
-        if issubclass(node.component, AttitudeFilter):
-            return pilot, node
-        if not issubclass(node.component, SunEstimator):
-            raise self._error(f"{node.name} is neither a Sun estimator nor an attitude filter")
-        if pilot not in (None, node):
-            raise self._error(f"{node.name} does not control, expected graph.estimator or an attitude filter")
-        return node, None
-
     def _vehicle(self, done: list[Event]) -> Vehicle:
         values = {node.name: self._values_after(node, done) for node in self.mission.nodes}
         plant, array = values[self._plant.name], values[self._array.name]
@@ -260,12 +208,13 @@ class MissionFlight:
 
     def _sensors(self, values: dict[str, Values], done: list[Event], field_is_heard: bool) -> Sensors:
         array = values[self._array.name]
-        gyro_values = values[self._gyro.name] if self._gyro else default_values(Gyro.table())
+        # without a gyro there is no bias to estimate
+        rates = gyro.parameters(values[self._gyro.name]) if self._gyro else _NO_GYRO
         field_values = values[self._magnetometer.name] if self._magnetometer else default_values(Magnetometer.table())
         return Sensors(
             cells=sun_cells.parameters(array),
             earthlit=array.albedo.enabled,
-            gyro=gyro.parameters(gyro_values),
+            gyro=rates,
             gyro_on=_is_on(self._gyro, done),
             magnetometer=magnetometer.parameters(field_values),
             magnetometer_on=_is_on(self._magnetometer, done),
@@ -281,30 +230,6 @@ class MissionFlight:
 
     def _key(self, case: int) -> RandomKey:
         return random_key(self.mission.values.mission.seed, case)
-
-    def _error(self, reason: str) -> MissionError:
-        return MissionError(f"{self.mission.origin}: {reason}")
-
-    def _part(self, component: type[Component]) -> Node | None:
-        nodes = [node for node in self.mission.nodes if node.component is component]
-        if len(nodes) > 1:
-            raise self._error(f"{nodes[0].name} and {nodes[1].name} are both {component.__name__}; expected one")
-        return nodes[0] if nodes else None
-
-    def _needed(self, component: type[Component]) -> Node:
-        node = self._part(component)
-        if node is None:
-            raise self._error(f"no node of graph.nodes is {component.__name__}, which the Monte Carlo needs")
-        return node
-
-    def _check_events(self) -> None:
-        switched = [node.name for node in (self._gyro, self._magnetometer) if node is not None]
-        for event in self.mission.events:
-            if event.action != "set" and event.node not in switched:
-                allowed = ", ".join(switched) or "none"
-                raise self._error(
-                    f"events.{event.name}: the Monte Carlo switches sensors alone, here {allowed}; fly it on the graph"
-                )
 
     def _values_after(self, node: Node, done: list[Event]) -> Values:
         """Values of a node once scripted changes have been made."""

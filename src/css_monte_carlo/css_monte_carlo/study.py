@@ -11,12 +11,13 @@ import numpy as np
 import pyarrow as pa
 
 from css_common.kernel import study_hash
-from css_common.mission import Mission
+from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.direct_flight import configured, is_attitude_filter
 from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
+from css_monte_carlo.mission_parts import NoPlace, parts_of
 from css_monte_carlo.percentiles import over_cases
 from css_monte_carlo.schedulers import Scheduler, ThreadScheduler
 from css_monte_carlo.study_folder import StudyFolder
@@ -109,13 +110,18 @@ def run_study(
         scheduler: where chunks run; None: threads of this process.
 
     Raises:
-        MissionError: a configuration does not fit the mission, a check before the flight refuses it, or it has no
-            place in the loop.
+        MissionError: a configuration does not fit the mission, a check before the flight refuses it, or it measures
+            nothing.
         StudyError: the folder cannot be used.
     """
     configurations = tuple(configurations)
     missions = [configuration.applied(mission) for configuration in configurations]
-    warnings = tuple(dict.fromkeys(line for flown in missions for line in preflight(flown)))
+    stepped = [_why_stepped(flown, c.estimator) for flown, c in zip(missions, configurations, strict=True)]
+    if guess_deg > 0.0 and any(stepped):
+        raise MissionError(f"{next(filter(None, stepped))}: attitude filters can be given no guess")
+    doubts = [line for flown in missions for line in preflight(flown)]
+    doubts += [f"{reason}; flown node by node, some hundred times slower" for reason in stepped if reason]
+    warnings = tuple(dict.fromkeys(doubts))
     report(warnings)
     sample_every = max(1, round(sample_s / (mission.period_ns * 1e-9)))
     store = StudyFolder(Path(folder))
@@ -128,16 +134,13 @@ def run_study(
     store.prepare(manifest)
     if store.complete:
         return replace(read_study(folder), warnings=warnings)
-    ranges = [
-        (first, min(CHUNK_CASES, first_case + cases - first))
-        for first in range(first_case, first_case + cases, CHUNK_CASES)
-    ]
+    ranges = [_ranges(first_case, first_case + cases, 1 if reason else CHUNK_CASES) for reason in stepped]
     tasks = {
         _chunk_name(i, first, count): ChunkTask(
             flown.text(), flown.origin, first, count, sample_every, configuration.estimator, guess_deg
         )
         for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
-        for first, count in ranges
+        for first, count in ranges[i]
     }
     waiting = {name: task for name, task in tasks.items() if not store.has_chunk(name)}
     total = cases * len(configurations)
@@ -154,7 +157,7 @@ def run_study(
             if progress is not None:
                 progress(done, total)
     parts = [
-        _Part(c, ATTITUDE if c.estimator in filters else HEADING, [_chunk_name(i, *chunk) for chunk in ranges])
+        _Part(c, ATTITUDE if c.estimator in filters else HEADING, [_chunk_name(i, *chunk) for chunk in ranges[i]])
         for i, c in enumerate(configurations)
     ]
     store.finish(
@@ -162,6 +165,20 @@ def run_study(
         _merged_percentiles(store, parts, sample_every * mission.period_ns * 1e-9),
     )
     return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
+
+
+def _why_stepped(mission: Mission, estimator: str) -> str | None:
+    """Why the compiled loop has no place for a mission; None if it has."""
+    try:
+        parts_of(mission, estimator)
+    except NoPlace as reason:
+        return str(reason)
+    return None
+
+
+def _ranges(first_case: int, end: int, size: int) -> list[tuple[int, int]]:
+    """First case and number of cases of each chunk."""
+    return [(first, min(size, end - first)) for first in range(first_case, end, size)]
 
 
 def _chunk_name(configuration: int, first: int, count: int) -> str:

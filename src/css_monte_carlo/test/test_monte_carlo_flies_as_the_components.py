@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from css_common.mission import default_mission, load_mission, mission_from_text
-from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
+from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_msgs.msg import SunEstimate
 
@@ -129,7 +129,7 @@ def test_the_same_over_several_blocks_and_scripted_changes():
 REFUSED = {
     "another event": (
         "/**: {ros__parameters: {events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
-        "scripted: events.a: the Monte Carlo switches sensors alone, here gyro; fly it on the graph",
+        "scripted: events.a: the compiled loop switches sensors alone, here gyro",
     ),
     "two gyros": (
         "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
@@ -142,14 +142,14 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_the_loop_has_no_place_for_is_named(case):
     text, reason = REFUSED[case]
-    with pytest.raises(MissionError) as error:
+    with pytest.raises(NoPlace) as error:
         MissionFlight(mission_from_text(text, "scripted"))
     assert reason in str(error.value)
     assert "\n" not in str(error.value)
 
 
-def test_a_sun_estimator_beside_the_one_that_controls_is_not_measured():
+def test_a_sun_estimator_beside_the_one_that_controls_has_no_place():
     nodes = "css_sim/dynamics,css_sim/css_array,css_estimation/ekf,css_estimation/wavg,sunpoint_control/mrp_control"
     mission = default_mission().with_overrides([f"graph.nodes={nodes}"])
-    with pytest.raises(MissionError, match="wavg does not control, expected"):
+    with pytest.raises(NoPlace, match="wavg does not control"):
         MissionFlight(mission, "wavg")

@@ -23,7 +23,7 @@ from css_common import places
 from css_common.command import CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
-from css_monte_carlo.mission_flight import measured_estimators, refuse_uncovered
+from css_monte_carlo.mission_parts import measured_estimators
 from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
@@ -98,7 +98,6 @@ def _run(options: argparse.Namespace) -> int:
     if options.seed is not None:
         overrides.append(f"mission.seed={options.seed}")
     mission = load_mission(options.mission, overrides)
-    refuse_uncovered(mission)
     configurations = _configurations(mission, options)
     for remark in mission.remarks:
         print(f"monte-carlo: {remark}", file=sys.stderr)
@@ -152,7 +151,8 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
         if not points:
             raise StudyError(f"--sweep {sweep}: expected KEY=V1,V2,...")
         axes.append([f"{key.strip()}={value}" for value in points])
-    estimators = options.estimators or measured_estimators(mission)
+    measured = measured_estimators(mission)
+    estimators = options.estimators or measured
     return [
         Configuration(estimator, gyro == "on", point)
         for point in itertools.product(*axes)
