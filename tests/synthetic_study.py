@@ -4,8 +4,15 @@
 import numpy as np
 import pyarrow as pa
 
-from css_monte_carlo.case_table import FIGURES
+from css_analysis.flight_metrics import Windows
+from css_analysis.quantities import study_quantities
 from css_monte_carlo.case_tallies import SAMPLED
+
+NAMES = [
+    quantity.study_column
+    for quantity in study_quantities(Windows(late_time=300.0, report_time=3000.0))
+    if not quantity.whole
+]
 
 
 def case_table(configurations, cases, values=None, seed=1):
@@ -15,7 +22,7 @@ def case_table(configurations, cases, values=None, seed=1):
     for configuration in configurations:
         given = (values or {}).get(configuration, {})
         for case in range(cases):
-            row = {name: float(random.uniform(0.0, 2.0)) for name in FIGURES}
+            row = {name: float(random.uniform(0.0, 2.0)) for name in NAMES}
             row |= {name: column[case] for name, column in given.items()}
             rows.append(_key(configuration) | {"case": case, "steps_without_estimate": 0} | row)
     return pa.Table.from_pylist(rows)

@@ -4,8 +4,8 @@
 import pytest
 from flights import fly_composed, messages_by_topic
 
+from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_figures import write_figures
-from css_analysis.flight_metrics import estimator_runs
 from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_bringup.report import unmet

@@ -7,6 +7,7 @@ from flights import fly_composed
 from scipy.spatial.transform import Rotation
 
 from css_analysis.flight_log import read_flight
+from css_analysis.flight_metrics import Windows
 from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_common.mission import load_mission
@@ -32,7 +33,7 @@ def figures():
     ):
         mission = load_mission(name, [TWO_ORBITS, *overrides])
         tallies = fly_cases(MissionFlight(mission), CASES, 1000).tallies
-        flown[key] = case_table(CASES, tallies, mission.period_ns * 1e-9)
+        flown[key] = case_table(CASES, tallies, mission.period_ns * 1e-9, Windows())
     return flown
 
 

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each node of each mission is cleaned up and configured again while the flight goes on around it."""
 
-from pathlib import Path
-
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
+from listing import MISSIONS
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from css_common.mission import load_mission
 from css_common.testing import Bench
-
-MISSIONS = sorted(path.stem for path in (Path(__file__).parents[1] / "config").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("name", MISSIONS)

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How well a flight was estimated and pointed, as O'Keefe & Schaub 2013 measure it (their Figs. 6-8).
 
-Everything is measured against the truth; without a truth in the log every quantity is None. Definitions:
+Everything is measured against the truth; without a truth in the log every quantity is None. What is measured stands in
+`css_analysis.quantities`. Definitions:
 
 sunlit          more than half of the solar disc is in view (truth.illumination > 0.5).
 power positive  the true Sun is within 30 deg of the array normal.
@@ -11,82 +12,37 @@ Imported telemetry says nothing about solar arrays and orbit: nothing is told of
 of estimates count over all of its lines.
 """
 
-from collections.abc import Iterable
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from css_analysis.estimate_errors import attitude_errors, estimated_rows, heading_errors
 from css_analysis.flight_log import FlightLog
+from css_common.mission import Mission
 
 POWER_POSITIVE = np.radians(30.0)
 """Largest angle [rad] between array normal and Sun at which the arrays carry the spacecraft."""
 ACQUIRED_AFTER = 60.0
 """Power-positive time [s] that makes an acquisition."""
-SETTLED_AFTER = 300.0
-"""Time [s] from the epoch after which an attitude filter counts as settled."""
 FINAL_TIME = 60.0
 """Time [s] at the end of the flight over which the final rate is averaged."""
 
-Run = dict[str, Any]
 
-QUANTITIES = {
-    "power_positive_s": "sunlit time [s] with the Sun over 30 deg off the array normal; None if never within",
-    "heading_error_mean_deg": "mean angle [deg] of estimated to true Sun, sunlit, after acquisition",
-    "heading_error_p95_deg": "95th percentile of the same angle [deg]",
-    "attitude_error_mean_deg": "mean angle [deg] of estimated to true attitude, from 300 s on",
-    "attitude_error_p95_deg": "95th percentile of the same angle [deg]",
-    "attitude_nees": "mean normalised error squared of the attitude, 3 if the filter is consistent, from 300 s on",
-    "pointing_error_mean_deg": "mean angle [deg] of array normal to true Sun, sunlit, after acquisition",
-    "pointing_error_sunlit_deg": "the same over all sunlit steps [deg], those before acquisition included",
-    "heading_error_sunlit_deg": "mean angle [deg] of estimated to true Sun over all sunlit steps with an estimate",
-    "rate_final_deg_s": "mean norm of the true body rate [deg/s] over the last 60 s",
-    "steps_without_estimate": "sunlit steps of the flight at which the estimator had none",
-}
-"""Measured quantities of a run and what they mean."""
+class Windows(NamedTuple):
+    """When is measured what a mission's `measures` section asks for; 0 where it does not."""
 
-_NOT_ACQUIRED = "the flight or its truth has no 60 s with the Sun within 30 deg of the array normal, or none after them"
-_NOT_SETTLED = "no attitude was estimated after the first 300 s"
-WITHOUT_VALUE = {
-    "power_positive_s": _NOT_ACQUIRED,
-    "heading_error_mean_deg": _NOT_ACQUIRED,
-    "heading_error_p95_deg": _NOT_ACQUIRED,
-    "pointing_error_mean_deg": _NOT_ACQUIRED,
-    "attitude_error_mean_deg": _NOT_SETTLED,
-    "attitude_error_p95_deg": _NOT_SETTLED,
-    "attitude_nees": _NOT_SETTLED,
-}
-"""Why a quantity may have no value; others have one wherever there are truth and estimates."""
+    settled_time: float = 0.0  # [s] from the epoch, after which an attitude filter counts as settled
+    late_time: float = 0.0  # [s] sunlit at the end of a flight, of the late heading error
+    report_time: float = 0.0  # [s] from the epoch, at which studies state the rates
 
 
-def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: str | None = None) -> list[Run]:
-    """What each estimator of a flight achieved: one dictionary with `QUANTITIES`, estimator, gyro and flown.
-
-    `power_positive_s`, the pointing errors and `rate_final_deg_s` belong to the flight: an estimator
-    that was replayed or flew beside has those of the one that controlled.
-
-    Args:
-        names: estimators to report, all by default.
-        flown: the estimator that controlled, when the log does not know.
-    """
-    flown = log.flown if flown is None else flown
-    flight = _flight_quantities(log)
-    return [
-        {
-            "estimator": name,
-            "gyro": "on" if log.uses_gyro(name) else "off",
-            "flown": name == flown,
-            "power_positive_s": flight["power_positive_s"],
-            **_heading_quantities(log, name),
-            **_attitude_quantities(log, name),
-            "pointing_error_mean_deg": flight["pointing_error_mean_deg"],
-            "pointing_error_sunlit_deg": flight["pointing_error_sunlit_deg"],
-            "heading_error_sunlit_deg": _heading_error_sunlit(log, name),
-            "rate_final_deg_s": flight["rate_final_deg_s"],
-            "steps_without_estimate": _steps_without_estimate(log, name),
-        }
-        for name in ((*log.estimates, *log.attitudes) if names is None else names)
-    ]
+def windows_of(mission: Mission | None) -> Windows:
+    """The windows that a mission asks for; of an unknown mission none."""
+    if mission is None:
+        return Windows()
+    measures = mission.values.measures
+    return Windows(*(float(getattr(measures, name)) for name in Windows._fields))
 
 
 def acquisition(log: FlightLog) -> int | None:
@@ -126,77 +82,120 @@ def sunlit_passes(log: FlightLog) -> list[Pass]:
     return passes
 
 
-def _flight_quantities(log: FlightLog) -> Run:
-    unknown: Run = dict.fromkeys(
-        ("power_positive_s", "pointing_error_mean_deg", "pointing_error_sunlit_deg", "rate_final_deg_s")
-    )
-    if log.truth is None:
-        return unknown
-    if log.imported:
-        # a table without rates has zeros there
-        return unknown | ({"rate_final_deg_s": _final_rate(log)} if np.any(log.truth.omega_bn_b) else {})
-    away = log.pointing_error > POWER_POSITIVE
-    start = acquisition(log)
-    counted = _counted(log, start)
-    return {
-        "power_positive_s": float(np.count_nonzero(away & log.sunlit)) * log.period
-        if np.any(~away & log.sunlit)
-        else None,
-        "pointing_error_mean_deg": _mean_deg(log.pointing_error[counted]),
-        "pointing_error_sunlit_deg": _mean_deg(log.pointing_error[log.sunlit]),
-        "rate_final_deg_s": _final_rate(log),
-    }
+class FlightMeasures:
+    """What is measured of a flight, whatever its estimators; None: it cannot be said."""
 
+    def __init__(self, log: FlightLog) -> None:
+        self.log = log
+        self.windows = windows_of(log.mission)
 
-def _final_rate(log: FlightLog) -> float | None:
-    time = log.time(log.having("truth"))
-    return _mean_deg(log.rate[time > time[-1] - FINAL_TIME + 0.01 * log.period])
-
-
-def _heading_quantities(log: FlightLog, name: str) -> Run:
-    mean = p95 = None
-    if log.truth is not None and name in log.estimates:
-        steps, errors = heading_errors(log, name)
-        errors = errors[_counted(log, acquisition(log))[steps]]
-        mean = _mean_deg(errors)
-        p95 = float(np.degrees(np.percentile(errors, 95.0))) if len(errors) else None
-    return {"heading_error_mean_deg": mean, "heading_error_p95_deg": p95}
-
-
-def _heading_error_sunlit(log: FlightLog, name: str) -> float | None:
-    if log.truth is None or name not in log.estimates:
-        return None
-    steps, errors = heading_errors(log, name)
-    return _mean_deg(errors[log.sunlit[steps]])
-
-
-def _attitude_quantities(log: FlightLog, name: str) -> Run:
-    mean = p95 = nees = None
-    if log.truth is not None and name in log.attitudes:
-        steps, errors, squared = attitude_errors(log, name)
-        settled = log.time(log.truth)[steps] >= SETTLED_AFTER - 0.01 * log.period
-        mean = _mean_deg(errors[settled])
-        if settled.any():
-            p95 = float(np.degrees(np.percentile(errors[settled], 95.0)))
-            nees = float(np.mean(squared[settled]))
-    return {"attitude_error_mean_deg": mean, "attitude_error_p95_deg": p95, "attitude_nees": nees}
-
-
-def _steps_without_estimate(log: FlightLog, name: str) -> int | None:
-    if log.truth is None:
-        return None
-    without = log.sunlit.copy()
-    without[estimated_rows(log, name)[1]] = False
-    return int(np.count_nonzero(without))
-
-
-def _counted(log: FlightLog, start: int | None) -> np.ndarray:
-    """(M,) True at the sunlit steps from acquisition on."""
-    counted = log.sunlit.copy()
-    if log.imported:
+    @cached_property
+    def counted(self) -> np.ndarray:
+        """(M,) True at the sunlit steps of the truth from acquisition on."""
+        counted = self.log.sunlit.copy()
+        if self.log.imported:
+            return counted
+        start = acquisition(self.log)
+        counted[: len(counted) if start is None else start] = False
         return counted
-    counted[: len(counted) if start is None else start] = False
-    return counted
+
+    @cached_property
+    def knows_arrays(self) -> bool:
+        """Whether the log says where solar arrays and shadow are."""
+        return self.log.truth is not None and not self.log.imported
+
+    def power_positive_s(self) -> float | None:
+        """Sunlit time [s] away from power positive."""
+        if not self.knows_arrays:
+            return None
+        away, sunlit = self.log.pointing_error > POWER_POSITIVE, self.log.sunlit
+        return float(np.count_nonzero(away & sunlit)) * self.log.period if np.any(~away & sunlit) else None
+
+    def pointing_error_mean_deg(self) -> float | None:
+        """Mean pointing error after acquisition."""
+        return _mean_deg(self.log.pointing_error[self.counted]) if self.knows_arrays else None
+
+    def pointing_error_sunlit_deg(self) -> float | None:
+        """Mean pointing error in sunlight."""
+        return _mean_deg(self.log.pointing_error[self.log.sunlit]) if self.knows_arrays else None
+
+    def rate_final_deg_s(self) -> float | None:
+        """Mean rate at the end; a table without rates has zeros there."""
+        truth = self.log.truth
+        if truth is None or (self.log.imported and not np.any(truth.omega_bn_b)):
+            return None
+        time = self.log.time(truth)
+        return _mean_deg(self.log.rate[time > time[-1] - FINAL_TIME + 0.01 * self.log.period])
+
+
+class EstimatorMeasures:
+    """What is measured of one estimator in a flight; None: it cannot be said."""
+
+    def __init__(self, flight: FlightMeasures, name: str) -> None:
+        self.flight = flight
+        self.name = name
+        self._log = flight.log
+
+    def heading_error_mean_deg(self) -> float | None:
+        """Mean heading error after acquisition."""
+        return _mean_deg(self._acquired_errors)
+
+    def heading_error_p95_deg(self) -> float | None:
+        """95th percentile of the heading error after acquisition."""
+        return _p95_deg(self._acquired_errors)
+
+    def heading_error_sunlit_deg(self) -> float | None:
+        """Mean heading error in sunlight."""
+        if self._headings is None:
+            return None
+        steps, errors = self._headings
+        return _mean_deg(errors[self._log.sunlit[steps]])
+
+    def attitude_error_mean_deg(self) -> float | None:
+        """Mean attitude error of a settled filter."""
+        return _mean_deg(self._settled[0])
+
+    def attitude_error_p95_deg(self) -> float | None:
+        """95th percentile of the attitude error of a settled filter."""
+        return _p95_deg(self._settled[0])
+
+    def attitude_nees(self) -> float | None:
+        """Mean normalised error squared of a settled filter."""
+        squared = self._settled[1]
+        return float(np.mean(squared)) if len(squared) else None
+
+    def steps_without_estimate(self) -> int | None:
+        """Sunlit steps without an estimate."""
+        if self._log.truth is None:
+            return None
+        without = self._log.sunlit.copy()
+        without[estimated_rows(self._log, self.name)[1]] = False
+        return int(np.count_nonzero(without))
+
+    @cached_property
+    def _headings(self) -> tuple[np.ndarray, np.ndarray] | None:
+        known = self._log.truth is not None and self.name in self._log.estimates
+        return heading_errors(self._log, self.name) if known else None
+
+    @cached_property
+    def _acquired_errors(self) -> np.ndarray:
+        if self._headings is None:
+            return _NONE
+        steps, errors = self._headings
+        return errors[self.flight.counted[steps]]
+
+    @cached_property
+    def _settled(self) -> tuple[np.ndarray, np.ndarray]:
+        """Errors [rad] and normalised errors squared from `Windows.settled_time` on."""
+        truth = self._log.truth
+        if truth is None or self.name not in self._log.attitudes:
+            return _NONE, _NONE
+        steps, errors, squared = attitude_errors(self._log, self.name)
+        settled = self._log.time(truth)[steps] >= self.flight.windows.settled_time - 0.01 * self._log.period
+        return errors[settled], squared[settled]
+
+
+_NONE = np.zeros(0)
 
 
 def _runs(flags: np.ndarray) -> list[tuple[int, int]]:
@@ -214,3 +213,7 @@ def _span(log: FlightLog, first: int, last: int) -> float:
 
 def _mean_deg(angles: np.ndarray) -> float | None:
     return float(np.degrees(np.mean(angles))) if len(angles) else None
+
+
+def _p95_deg(angles: np.ndarray) -> float | None:
+    return float(np.degrees(np.percentile(angles, 95.0))) if len(angles) else None

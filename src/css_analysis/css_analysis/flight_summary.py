@@ -6,21 +6,12 @@ from typing import NamedTuple, TextIO
 
 from rich.console import Console
 
-from css_analysis.flight_metrics import QUANTITIES, WITHOUT_VALUE, Run
+from css_analysis.estimator_runs import Run
+from css_analysis.quantities import QUANTITIES, Quantity
 from css_analysis.readable_table import ReadableTable
 from css_common.schema import unknown_name
 
-_COLUMNS = {
-    "power_positive_s": ("con-\nverging\n[s]", "{:.1f}"),
-    "heading_error_mean_deg": ("heading\nerror\nmean\n[deg]", "{:.2f}"),
-    "heading_error_p95_deg": ("heading\nerror\n95 %\n[deg]", "{:.2f}"),
-    "attitude_error_mean_deg": ("attitude\nerror\nmean\n[deg]", "{:.3f}"),
-    "attitude_error_p95_deg": ("attitude\nerror\n95 %\n[deg]", "{:.3f}"),
-    "attitude_nees": ("attitude\nNEES\n(3)", "{:.2f}"),
-    "pointing_error_mean_deg": ("pointing\nerror\nmean\n[deg]", "{:.2f}"),
-    "rate_final_deg_s": ("final\nrate\n[deg/s]", "{:.3f}"),
-    "steps_without_estimate": ("steps\nwithout\nestimate", "{:d}"),
-}
+_COLUMNS = [quantity for quantity in QUANTITIES.values() if quantity.heading]
 
 
 def summary_table(runs: Iterable[Run], title: str = "") -> ReadableTable:
@@ -33,22 +24,22 @@ def summary_table(runs: Iterable[Run], title: str = "") -> ReadableTable:
     table.add_name("estimator")
     table.add_number("gyro")
     columns = _columns_of(runs)
-    for heading, _ in columns.values():
-        table.add_number(heading)
+    for quantity in columns:
+        table.add_number(quantity.title)
     for run in runs:
         shown = []
-        for quantity, (_, text) in columns.items():
-            value = run[quantity]
-            shown.append("-" if value is None else text.format(value))
+        for quantity in columns:
+            value = run[quantity.name]
+            shown.append("-" if value is None else quantity.form.format(value))
         table.add_texts([run["estimator"] + (" (flown)" if run["flown"] else ""), run["gyro"], *shown])
     return table
 
 
-def _columns_of(runs: Sequence[Run]) -> dict[str, tuple[str, str]]:
+def _columns_of(runs: Sequence[Run]) -> list[Quantity]:
     """The columns of Sun estimators, and where there are attitude filters, theirs and what else has a value."""
     if any(run["attitude_error_mean_deg"] is not None for run in runs):
-        return {name: column for name, column in _COLUMNS.items() if any(run[name] is not None for run in runs)}
-    return {name: column for name, column in _COLUMNS.items() if not name.startswith("attitude")}
+        return [quantity for quantity in _COLUMNS if any(run[quantity.name] is not None for run in runs)]
+    return [quantity for quantity in _COLUMNS if not quantity.name.startswith("attitude")]
 
 
 def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = None) -> None:
@@ -117,7 +108,7 @@ def criteria_failures(criteria: Mapping[str, Mapping[str, float]], runs: Iterabl
 def _failure(missed: Verdict) -> str:
     where, criterion = f"{missed.estimator}: {missed.quantity}", f"criteria.{missed.quantity}"
     if missed.value is None:
-        why = WITHOUT_VALUE.get(missed.quantity, "truth or estimates are missing")
+        why = QUANTITIES[missed.quantity].without_value or "truth or estimates are missing"
         return f"{where} has no value, but {criterion} asks for one: {why}"
     side = "below" if missed.bound == "min" else "above"
     return f"{where} is {missed.value:.6g}, {side} {criterion}.{missed.bound} {missed.limit:g}"

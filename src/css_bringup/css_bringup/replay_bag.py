@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import IMPORTED_FROM, FlightLog, read_flight
-from css_analysis.flight_metrics import Run, estimator_runs
 from css_bringup.estimator_request import EstimatorRequest
 from css_bringup.replay_pass import Replay
 from css_bringup.replay_verdict import shortcomings, software_apart

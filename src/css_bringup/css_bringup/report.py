@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from css_analysis.flight_metrics import Run
+from css_analysis.estimator_runs import Run
 from css_analysis.flight_summary import Verdict, criteria_failures, criteria_verdicts, summary_table
 from css_bringup.flight_result import FlightResult
 from css_bringup.options import complain

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Missions: one ROS 2 parameter file each, validated as a whole by every reader.
 
-Shared sections stand under `/**`, node parameters under the node's name. The file is read unchanged by
+Shared sections stand under `/**`, node parameters under the node's name. A mission may extend another one
+(`css_common.mission_extends`); what flies and is recorded is the whole of both. The file is read unchanged by
 `ros2 run ... --params-file`, by the launch file, by the composed flight and by studies; ROS itself ignores keys that
 nobody declares, so each reader checks the whole file here first and a typo dies everywhere.
 """
@@ -17,7 +18,8 @@ from css_common import sections
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant
 from css_common.epochs import parse_utc
-from css_common.mission_file import MissionError, dump_sections, flattened, read_sections, read_text
+from css_common.mission_extends import sections_of_file, sections_of_text
+from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
 from css_common.mission_script import Event, criteria_of, events_of
 from css_common.node_files import find_component, parse_node_entry
@@ -373,16 +375,18 @@ def load_mission(name: str | Path, overrides: Iterable[str] = ()) -> Mission:
         MissionError: the file is missing, is no parameter file, or anything in it is wrong.
     """
     path = find_mission(str(name))
-    text = read_text(path)
-    if not any(read_sections(text, str(path)).values()):
+    parameters = sections_of_file(path)
+    if not any(parameters.values()):
         raise MissionError(f"{path}: holds no parameters, expected sections such as {SHARED}: {{ros__parameters: ...}}")
-    return mission_from_text(text, str(path), overrides)
+    return _changed(Mission(str(path), parameters), overrides)
 
 
 def mission_from_text(text: str, origin: str, overrides: Iterable[str] = ()) -> Mission:
     """The mission of a parameter file's text (for instance the one embedded in a recording)."""
-    parameters = {name: flattened(section) for name, section in read_sections(text, origin).items()}
-    mission = Mission(origin, parameters)
+    return _changed(Mission(origin, sections_of_text(text, origin)), overrides)
+
+
+def _changed(mission: Mission, overrides: Iterable[str]) -> Mission:
     overrides = list(overrides)
     return mission.with_overrides(overrides) if overrides else mission
 

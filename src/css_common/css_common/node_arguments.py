@@ -9,7 +9,8 @@ from typing import Any
 
 from css_common.component import Component
 from css_common.mission import Mission
-from css_common.mission_file import MissionError, flattened, read_sections, read_text
+from css_common.mission_extends import sections_of_file
+from css_common.mission_file import MissionError
 from css_common.parameter_sections import (
     SHARED,
     Sections,
@@ -98,7 +99,7 @@ def mission_of_arguments(component_type: type[Component], arguments: Iterable[st
     given = parse_arguments(executable, arguments)
     _refuse_bad_names(given)
     _refuse_unknown_overrides(component_type, given)
-    files = [(file, _sections_of(file)) for file in given.files]
+    files = [(file, sections_of_file(file)) for file in given.files]
     sections = merged_files(read for _, read in files)
     origin = ", ".join(given.files) or "defaults"
     if "graph.nodes" in shared_by_all(sections, given.namespace):
@@ -108,10 +109,6 @@ def mission_of_arguments(component_type: type[Component], arguments: Iterable[st
     mission = Mission(origin, sections, given.namespace, (given.name, component_type))
     mission.remarks += tuple(_for_another_namespace(files, given))
     return mission
-
-
-def _sections_of(file: str) -> dict[str, dict[str, Any]]:
-    return {section: flattened(body) for section, body in read_sections(read_text(file), file).items()}
 
 
 def _refuse_bad_names(given: NodeArguments) -> None:

@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
+from operator import attrgetter
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -22,13 +23,16 @@ _LONGEST_NAME = 100  # [characters] of a name that is compared and shown whole
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff]")
 
 
+T = TypeVar("T")
+
+
 class ParameterError(ValueError):
     """A parameter that is unknown, of the wrong kind, out of range or in conflict with another."""
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """Specification of one parameter; made by the functions below."""
+class Parameter(Generic[T]):
+    """Specification of one parameter; made by the functions below. `T` is what algorithms see of its value."""
 
     name: str
     kind: str
@@ -191,7 +195,7 @@ def real(
     high: float | None = None,
     open_low: bool = False,
     tunable: bool = False,
-) -> Parameter:
+) -> Parameter[float]:
     """A number. `open_low` excludes the lower bound itself; `tunable` allows a change in flight."""
     return Parameter(name, "real", float(default), unit, description, low, high, open_low=open_low, tunable=tunable)
 
@@ -205,22 +209,24 @@ def integer(
     low: int | None = None,
     high: int | None = None,
     tunable: bool = False,
-) -> Parameter:
+) -> Parameter[int]:
     """A whole number."""
     return Parameter(name, "integer", default, unit, description, low, high, tunable=tunable)
 
 
-def flag(name: str, default: bool, description: str, *, tunable: bool = False) -> Parameter:
+def flag(name: str, default: bool, description: str, *, tunable: bool = False) -> Parameter[bool]:
     """True or false."""
     return Parameter(name, "flag", default, "-", description, tunable=tunable)
 
 
-def choice(name: str, default: str, choices: tuple[str, ...], description: str, *, tunable: bool = False) -> Parameter:
+def choice(
+    name: str, default: str, choices: tuple[str, ...], description: str, *, tunable: bool = False
+) -> Parameter[str]:
     """One of a few words."""
     return Parameter(name, "choice", default, "-", description, choices=choices, tunable=tunable)
 
 
-def text(name: str, default: str, description: str) -> Parameter:
+def text(name: str, default: str, description: str) -> Parameter[str]:
     """A text."""
     return Parameter(name, "text", default, "-", description)
 
@@ -237,7 +243,7 @@ def reals(
     high: float | None = None,
     open_low: bool = False,
     tunable: bool = False,
-) -> Parameter:
+) -> Parameter[np.ndarray]:
     """Several numbers: of a given `length`, or rows of `columns` each; bounds hold for each."""
     return Parameter(
         name,
@@ -254,21 +260,25 @@ def reals(
     )
 
 
-def integers(name: str, default: Iterable[int], unit: str, description: str, **limits: Any) -> Parameter:
+def integers(name: str, default: Iterable[int], unit: str, description: str, **limits: Any) -> Parameter[np.ndarray]:
     """Several whole numbers."""
     return Parameter(name, "integers", list(default), unit, description, **limits)
 
 
-def texts(name: str, default: Iterable[str], description: str) -> Parameter:
+def texts(name: str, default: Iterable[str], description: str) -> Parameter[list[str]]:
     """Several texts."""
     return Parameter(name, "texts", list(default), "-", description)
 
 
-Table = tuple[Parameter, ...]
+Table = tuple[Parameter[Any], ...]
 
 
 class Values(SimpleNamespace):
-    """Checked values of a table by attribute: `values.cells.normals`."""
+    """Checked values of a table by attribute, `values.cells.normals`, or typed by parameter, `values[NORMALS]`."""
+
+    def __getitem__(self, parameter: Parameter[T]) -> T:
+        value: T = attrgetter(parameter.name)(self)
+        return value
 
     def items(self, prefix: str = "") -> Iterator[tuple[str, Any]]:
         """Dotted names and values."""

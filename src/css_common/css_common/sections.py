@@ -190,6 +190,26 @@ SLITS: Table = (
     ),
 )
 
+MEASURES: Table = (
+    real(
+        "measures.settled_time", 0.0, "s", "from the epoch, after which an attitude filter counts as settled", low=0.0
+    ),
+    real(
+        "measures.late_time",
+        0.0,
+        "s",
+        "sunlit time at the end of a flight whose mean heading error studies state; 0: they do not",
+        low=0.0,
+    ),
+    real(
+        "measures.report_time",
+        0.0,
+        "s",
+        "time from the epoch at which studies state the body rate and its error; 0: they do not",
+        low=0.0,
+    ),
+)
+
 GRAPH: Table = (
     texts(
         "graph.nodes",
@@ -254,6 +274,7 @@ SECTIONS: dict[str, Table] = {
     "magnetometer": MAGNETOMETER,
     "payload": PAYLOAD,
     "slits": SLITS,
+    "measures": MEASURES,
     "graph": GRAPH,
     "lockstep": LOCKSTEP,
     "io": IO,

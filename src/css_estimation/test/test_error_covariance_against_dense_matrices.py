@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_estimation.sun.error_covariance import (
@@ -49,6 +50,29 @@ def test_propagation_is_the_solution_of_the_lyapunov_equation():
     propagate(p, rotation_vector_to_dcm(tuple(dt * omega)), dt, sv2, su2, True)
     np.testing.assert_allclose(p, expected, rtol=0.0, atol=2e-4 * dt * np.abs(p).max())
     np.testing.assert_array_equal(p, p.T)
+
+
+@pytest.mark.parametrize("dt", [0.1, 2.0])
+def test_noise_alone_is_van_loans_integral(dt):
+    """Of a body at rest the discrete noise is exact: every block of it, from the walk of the bias alone too."""
+    f = np.block([[np.zeros((3, 3)), -np.eye(3)], [np.zeros((3, 6))]])
+    identity = tuple(map(tuple, np.eye(3).tolist()))
+    for sv2, su2 in ((0.0, 1e-3), (1e-2, 0.0), (3e-3, 2e-3)):
+        q = np.diag([sv2] * 3 + [su2] * 3)
+        exponential = expm(dt * np.block([[-f, q], [np.zeros((6, 6)), f.T]]))
+        p = np.zeros((6, 6))
+        propagate(p, identity, dt, sv2, su2, True)
+        np.testing.assert_allclose(p, exponential[6:, 6:].T @ exponential[:6, 6:], rtol=1e-12, atol=1e-18)
+
+
+def test_an_error_of_the_bias_turns_the_attitude():
+    p = random_covariance(9)
+    turn, dt = np.array(rotation_vector_to_dcm((0.1, 0.2, -0.1))), 2.0
+    phi = np.eye(9)
+    phi[:3, :3], phi[:3, 3:6] = turn, -dt * np.eye(3)
+    expected = phi @ p @ phi.T
+    propagate(p, tuple(map(tuple, turn.tolist())), dt, 0.0, 0.0, True)
+    np.testing.assert_allclose(p, expected, rtol=1e-12, atol=1e-15)
 
 
 def test_without_gyro_the_bias_turns_nothing():

@@ -7,15 +7,14 @@ attitude and bias together, with six (Bar-Shalom, Li & Kirubarajan, section 5.4)
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from css_analysis.flight_metrics import SETTLED_AFTER
 from css_common.attitude import mrp_angle, mrp_subtract, mrp_to_rotation_vector
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, norm, subtract
-from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeMemory, AttitudeSolution
+from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeSolution
 from css_estimation.sun.error_covariance import attitude_block
 from css_estimation.symmetric import inverse_form, trace
 from css_monte_carlo.case_tallies import BIN_DEG, BINS, SUNLIT, sample_count
@@ -49,15 +48,15 @@ class AttitudeTallies(NamedTuple):
     work: np.ndarray  # (6, 7) room for an elimination
 
 
-def new_tallies(cases: int, steps: int, period_s: float, sample_every: int) -> AttitudeTallies:
-    """Nothing seen yet, for flights of so many steps."""
+def new_tallies(cases: int, steps: int, period_s: float, sample_every: int, settled_time: float) -> AttitudeTallies:
+    """Nothing seen yet, for flights of so many steps; filters count as settled from `settled_time` [s] on."""
     totals = np.zeros(cases, TALLY)
     totals["first_step"] = -1
     return AttitudeTallies(
         totals,
         np.zeros((cases, BINS), np.int64),
         np.full((cases, len(SAMPLED), sample_count(steps, sample_every)), np.nan, np.float32),
-        math.ceil(SETTLED_AFTER / period_s - 1e-9),
+        math.ceil(settled_time / period_s - 1e-9),
         sample_every,
         np.zeros((6, 7)),
     )
@@ -79,14 +78,14 @@ def tally_step(
     truth: Truth,
     heading,
     attitude: AttitudeSolution,
-    memory: AttitudeMemory,
+    memory: Any,
 ) -> None:
     """Counts one step of case `c`.
 
     Args:
         marks: of the step, see `case_tallies.step_marks`.
         heading: of a Sun estimator, not read.
-        attitude, memory: what the filter says, and its covariance.
+        attitude, memory: what the filter says; of its memory the `covariance` (n, n) is read.
     """
     t = tallies.totals[c]
     if attitude.validity == VALIDITY_NONE:

@@ -11,17 +11,14 @@ import numpy as np
 
 from css_analysis.estimate_errors import tangent_nees_of
 from css_analysis.flight_log import SUNLIT_FRACTION
-from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITIVE
+from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITIVE, Windows
 from css_common.kernel import kernel
 from css_common.vectors import angle_between, norm, subtract
 from css_estimation.sun.sun_heading import VALIDITY_NONE, SunHeading
 from css_monte_carlo.step_truth import Truth
 
-REPORT_TIME = 3000.0
-"""Elapsed time [s] at which O'Keefe & Schaub 2013 state the rates (50 minutes); averaged over the minute before."""
 REPORT_SPAN = 60.0
-LATE_TIME = 300.0
-"""Sunlit time [s] at the end of a flight over which the late heading error is averaged."""
+"""Time [s] before `Windows.report_time` over which rates are averaged."""
 
 # What is special about a step, the same for all cases.
 SUNLIT, FIRST_PASS, LATE, REPORTED, FINAL = 1, 2, 4, 8, 16
@@ -114,7 +111,7 @@ def sample_count(steps: int, sample_every: int) -> int:
     return (steps + sample_every - 1) // sample_every
 
 
-def step_marks(illumination: np.ndarray, period_s: float) -> np.ndarray:
+def step_marks(illumination: np.ndarray, period_s: float, windows: Windows) -> np.ndarray:
     """(K,) marks SUNLIT, FIRST_PASS, LATE, REPORTED and FINAL of the steps of a flight."""
     steps = np.arange(len(illumination))
     lit = illumination > SUNLIT_FRACTION
@@ -123,13 +120,14 @@ def step_marks(illumination: np.ndarray, period_s: float) -> np.ndarray:
         begin = int(np.argmax(lit))
         end = begin + int(np.argmin(lit[begin:])) if not lit[begin:].all() else len(lit)
         marks |= np.where((steps >= begin) & (steps < end), FIRST_PASS, 0)
-        late = np.flatnonzero(lit)[-max(1, round(LATE_TIME / period_s)) :]
-        marks[late] |= LATE
+        if windows.late_time > 0.0:
+            late = np.flatnonzero(lit)[-max(1, round(windows.late_time / period_s)) :]
+            marks[late] |= LATE
     elapsed_s = steps * period_s
     slack = 0.01 * period_s
-    marks |= np.where((elapsed_s > REPORT_TIME - REPORT_SPAN + slack) & (elapsed_s <= REPORT_TIME + slack), REPORTED, 0)
-    if elapsed_s[-1] < REPORT_TIME - slack:
-        marks &= ~REPORTED
+    report = windows.report_time
+    if 0.0 < report <= elapsed_s[-1] + slack:
+        marks |= np.where((elapsed_s > report - REPORT_SPAN + slack) & (elapsed_s <= report + slack), REPORTED, 0)
     marks |= np.where(elapsed_s > elapsed_s[-1] - FINAL_TIME + slack, FINAL, 0)
     return marks.astype(np.int64)
 

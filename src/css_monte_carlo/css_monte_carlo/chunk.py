@@ -12,8 +12,11 @@ import numba.typed
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
+from css_monte_carlo.case_table import case_table
 from css_monte_carlo.loop import fly_block
+from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.stepped_flight import SteppedFlight
@@ -39,7 +42,7 @@ class ChunkTask(NamedTuple):
 class Flown(NamedTuple):
     """What the cases of a chunk gave."""
 
-    tallies: Any  # running sums of the measured estimator, see `measures`
+    tallies: CaseTallies  # running sums of the measured estimator
     trace: np.ndarray  # (C, steps, `MissionFlight.trace_columns`) of every step's values; empty unless asked for
     cpu_s: float  # processor time of the loop, without preparation
 
@@ -52,7 +55,8 @@ def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
         tallies, cpu_s = flight.fly(numbers, task.sample_every)
     else:
         tallies, _, cpu_s = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
-    return flight.measure.table(numbers, tallies, flight.mission.period_ns * 1e-9), cpu_s
+    period_s = flight.mission.period_ns * 1e-9
+    return case_table(numbers, tallies, period_s, windows_of(flight.mission)), cpu_s
 
 
 @lru_cache(maxsize=2)
@@ -72,7 +76,7 @@ def fly_cases(
     """Flies cases (C,) of a mission, each independent of the others; `guess_deg` as of `MissionFlight.cases`."""
     cases, initial = flight.cases(numbers, guess_deg)
     period_s = flight.mission.period_ns * 1e-9
-    tallies = flight.measure.new_tallies(len(numbers), flight.steps, period_s, sample_every)
+    tallies = flight.measure.new_tallies(len(numbers), flight.steps, period_s, sample_every, windows_of(flight.mission))
     trace = np.zeros((len(numbers), flight.steps, flight.trace_columns) if traced else (0, 0, 0))
     states = numba.typed.List(initial)
     cpu_s = 0.0

@@ -18,7 +18,7 @@ from css_monte_carlo.surroundings import references_at
 
 
 def estimate_heading(p, state, dt, voltages, aiding, eclipse_predicted):
-    """State and `SunHeading` after one cycle of a Sun estimator; arguments in `css_estimation.sun.sun_heading`."""
+    """State and `SunHeading` after one cycle of a Sun estimator; arguments in `css_estimation.sun.sun_algorithm`."""
     return _heading_step(_home(p))(p, state, dt, voltages, aiding, eclipse_predicted)
 
 

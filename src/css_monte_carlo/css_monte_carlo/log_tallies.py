@@ -7,6 +7,7 @@ import numpy as np
 
 from css_analysis.estimate_errors import true_attitudes
 from css_analysis.flight_log import FlightLog
+from css_analysis.flight_metrics import windows_of
 from css_common.attitude import quaternion_to_mrp
 from css_common.kernel import typed_call
 from css_common.vectors import Vec3
@@ -42,7 +43,7 @@ def tally_headings(tallies: Tallies, c: int, log: FlightLog, name: str, wheels: 
     estimates = log.estimates.get(name)
     rows = _rows_by_step(log, None if estimates is None else log.truth_rows(estimates))
     momentum_b = _wheel_momentum(log, wheels)
-    marks = step_marks(log.having("truth").illumination, log.period)
+    marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
     count = typed_call(case_tallies.tally_step)
     for step, row in enumerate(rows):
         heading = _NO_HEADING if estimates is None or row < 0 else _heading(estimates, row)
@@ -62,7 +63,7 @@ def tally_attitudes(tallies: AttitudeTallies, c: int, log: FlightLog, name: str,
     pairs = None if attitudes is None else log.truth_rows(attitudes)
     if attitudes is not None and pairs is not None:
         sigma_bn[pairs[1]] = true_attitudes(log, pairs[1], attitudes.delay[pairs[0]])
-    marks = step_marks(log.having("truth").illumination, log.period)
+    marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
     count = typed_call(attitude_tallies.tally_step)
     memory = ReportedCovariance(np.zeros((6, 6)))
     for step, row in enumerate(_rows_by_step(log, pairs)):

@@ -2,38 +2,54 @@
 """How estimates of each kind are measured in a study: running sums while flying, and the columns that they give."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numpy as np
-import pyarrow as pa
+from css_analysis.flight_metrics import Windows
+from css_analysis.quantities import (
+    Quantity,
+    Summary,
+    attitude_quantities,
+    attitude_summaries,
+    study_quantities,
+    summaries,
+)
+from css_monte_carlo import attitude_tallies, case_tallies
+from css_monte_carlo.attitude_tallies import AttitudeTallies
+from css_monte_carlo.case_tallies import Tallies
 
-from css_monte_carlo import attitude_table, attitude_tallies, case_table, case_tallies
+CaseTallies = Tallies | AttitudeTallies
 
 
 class Measure(NamedTuple):
     """Of one kind of estimator."""
 
-    figures: tuple[str, ...]  # columns of a case
+    tallies: type
+    new_tallies: Callable[[int, int, float, int, Windows], CaseTallies]  # cases, steps, period [s], steps to a sample
     sampled: tuple[str, ...]  # quantities against time
-    new_tallies: Callable[[int, int, float, int], Any]  # cases, steps, period [s], steps from sample to sample
-    table: Callable[[np.ndarray, Any, float], pa.Table]  # case numbers, tallies, period [s]
+    quantities: Callable[[Windows], tuple[Quantity, ...]]  # columns of a case
+    summaries: Callable[[Windows], tuple[Summary, ...]]  # what is told of all cases
     estimate_columns: int  # of a trace
 
 
+def _new_headings(cases: int, steps: int, period_s: float, sample_every: int, windows: Windows) -> CaseTallies:
+    return case_tallies.new_tallies(cases, steps, period_s, sample_every)
+
+
+def _new_attitudes(cases: int, steps: int, period_s: float, sample_every: int, windows: Windows) -> CaseTallies:
+    return attitude_tallies.new_tallies(cases, steps, period_s, sample_every, windows.settled_time)
+
+
 HEADING = Measure(
-    case_table.FIGURES,
-    case_tallies.SAMPLED,
-    case_tallies.new_tallies,
-    case_table.case_table,
-    case_tallies.ESTIMATE_COLUMNS,
+    Tallies, _new_headings, case_tallies.SAMPLED, study_quantities, summaries, case_tallies.ESTIMATE_COLUMNS
 )
 """Of a Sun estimator."""
 
 ATTITUDE = Measure(
-    attitude_table.FIGURES,
+    AttitudeTallies,
+    _new_attitudes,
     attitude_tallies.SAMPLED,
-    attitude_tallies.new_tallies,
-    attitude_table.attitude_table,
+    attitude_quantities,
+    attitude_summaries,
     attitude_tallies.ESTIMATE_COLUMNS,
 )
 """Of an attitude filter."""

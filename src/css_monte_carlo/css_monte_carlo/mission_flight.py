@@ -4,11 +4,11 @@
 import math
 from collections.abc import Iterator
 from itertools import pairwise
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from css_analysis.flight_metrics import windows_of
 from css_common.attitude import mrp_add, rotation_vector_to_mrp
 from css_common.mission import Event, Mission, Node
 from css_common.random_streams import RandomKey, Stream, normal4, random_key
@@ -98,7 +98,7 @@ class MissionFlight:
             MODELS[array.albedo.model],
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
-        self.marks = step_marks(illumination, mission.period_ns * 1e-9)
+        self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
 
     @property
     def trace_columns(self) -> int:
@@ -172,7 +172,7 @@ class MissionFlight:
             return None, None
         p = _parameters(self._filter, self._filter.values)
         if guess_deg > 0.0:
-            p = p._replace(given=_guessed_start(key, sigma_bn, guess_deg))
+            p = p._replace(start=_guessed_start(key, sigma_bn, guess_deg))
         algorithm = _algorithm(self._filter)
         return algorithm.initial_state(p), algorithm.initial_memory(p)
 
@@ -242,7 +242,7 @@ def _values(node: Node | None) -> Values | None:
     return None if node is None else node.values
 
 
-def _algorithm(node: Node) -> ModuleType:
+def _algorithm(node: Node) -> Any:
     """The module of an estimator's node."""
     component = node.component
     assert issubclass(component, (SunEstimator, AttitudeFilter))

@@ -5,15 +5,16 @@ The same study as any other, measured by the same sums, some hundred times slowe
 """
 
 import time
-from typing import Any
 
 import numpy as np
 
+from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission, MissionError
 from css_common.random_streams import RandomKey, random_key
+from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.direct_flight import fly_checked
 from css_monte_carlo.log_tallies import tally_attitudes, tally_headings
-from css_monte_carlo.measures import ATTITUDE, HEADING
+from css_monte_carlo.measures import ATTITUDE, HEADING, CaseTallies
 from css_monte_carlo.mission_parts import is_attitude, is_heading
 from css_monte_carlo.study_folder import StudyError
 from css_sim import gyro, initial_conditions
@@ -46,7 +47,7 @@ class SteppedFlight:
         self.measure = ATTITUDE if is_attitude(node) else HEADING
         self._estimator = node.name
 
-    def fly(self, numbers: np.ndarray, sample_every: int) -> tuple[Any, float]:
+    def fly(self, numbers: np.ndarray, sample_every: int) -> tuple[CaseTallies, float]:
         """Running sums of cases (C,), and processor time [s].
 
         Raises:
@@ -54,7 +55,9 @@ class SteppedFlight:
         """
         start = time.thread_time()
         period_s = self.mission.period_ns * 1e-9
-        tallies = self.measure.new_tallies(len(numbers), self.mission.steps, period_s, sample_every)
+        tallies = self.measure.new_tallies(
+            len(numbers), self.mission.steps, period_s, sample_every, windows_of(self.mission)
+        )
         for c, number in enumerate(numbers):
             flown = self.mission.with_overrides([f"mission.case={number}"])
             try:
@@ -62,7 +65,7 @@ class SteppedFlight:
             except MotionError as error:
                 raise StudyError(f"case {number} of {flown.name}: {error}") from error
             key = random_key(flown.values.mission.seed, int(number))
-            if self.measure is ATTITUDE:
+            if isinstance(tallies, AttitudeTallies):
                 tally_attitudes(tallies, c, log, self._estimator, self._gyro_bias(key))
             else:
                 tally_headings(tallies, c, log, self._estimator, self._wheels(key))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.flight_metrics import Windows, windows_of
 from css_common.kernel import study_hash
 from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight, report
@@ -58,7 +59,7 @@ class Study:
     Attributes:
         folder: where it lies.
         manifest: what was asked for.
-        cases: one row per configuration and case: estimator, gyro, overrides, case and the figures of `measures`;
+        cases: one row per configuration and case: estimator, gyro, overrides, case and the quantities of `measures`;
             null what is not of the kind of the estimator.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
@@ -157,8 +158,13 @@ def run_study(
             if progress is not None:
                 progress(done, total)
     parts = [
-        _Part(c, ATTITUDE if c.estimator in filters else HEADING, [_chunk_name(i, *chunk) for chunk in ranges[i]])
-        for i, c in enumerate(configurations)
+        _Part(
+            configuration,
+            ATTITUDE if configuration.estimator in filters else HEADING,
+            windows_of(flown),
+            [_chunk_name(i, *chunk) for chunk in ranges[i]],
+        )
+        for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
     ]
     store.finish(
         _merged_cases(store, parts),
@@ -208,16 +214,17 @@ class _Part(NamedTuple):
 
     configuration: Configuration
     measure: Measure
+    windows: Windows
     chunks: list[str]
 
 
 def _merged_cases(store: StudyFolder, parts: Sequence[_Part]) -> pa.Table:
     tables = []
     for part in parts:
-        columns = ["case", *part.measure.figures, "steps_without_estimate"]
+        columns = ["case", *(quantity.study_column for quantity in part.measure.quantities(part.windows))]
         table = pa.concat_tables([store.read_chunk(name, columns) for name in part.chunks]).combine_chunks()
         tables.append(_labelled(part.configuration, table))
-    # nulls where configurations have different figures
+    # a sweep may change what is measured, and estimators of each kind have columns of their own
     return pa.concat_tables(tables, promote_options="default").combine_chunks()
 
 

@@ -7,19 +7,24 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
-from css_monte_carlo.measures import ATTITUDE
+from css_analysis.flight_metrics import windows_of
+from css_analysis.quantities import Summary
+from css_common.mission import mission_from_text
+from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.study import Study
 
 
 def configuration_objects(study: Study) -> list[dict[str, Any]]:
     """One dictionary per configuration: means over the cases; None for what no case reached."""
-    filters = study.manifest.get("attitude_filters", ())
     return [
         {
             "estimator": labels["estimator"],
             "gyro": "on" if labels["gyro"] else "off",
             "overrides": labels["overrides"].split(),
-            **(_attitude_figures if labels["estimator"] in filters else _figures)(rows_of(study.cases, **labels)),
+            **{
+                summary.name: _over(rows_of(study.cases, **labels), summary)
+                for summary in summaries_of(study, labels["estimator"])
+            },
         }
         for labels in study.manifest["configurations"]
     ]
@@ -47,28 +52,17 @@ def rows_of(table: pa.Table, **labels: Any) -> pa.Table:
     return table
 
 
-def _figures(cases: pa.Table) -> dict[str, Any]:
-    converging = cases["converging_s"]
-    return {
-        "heading_error_mean_deg": _mean(cases, "heading_error_mean_deg"),
-        "heading_error_p95_deg": _mean(cases, "heading_error_p95_deg"),
-        "power_positive_fraction": 1.0 - cases["acquired_s"].null_count / cases.num_rows,
-        "converging_max_s": pc.max(converging).as_py(),
-        "converging_mean_s": _mean(cases, "converging_s"),
-        "rate_50min_deg_s": _mean(cases, "rate_50min_deg_s"),
-        "rate_knowledge_50min_deg_s": _mean(cases, "rate_knowledge_50min_deg_s"),
-    }
+def summaries_of(study: Study, estimator: str) -> tuple[Summary, ...]:
+    """What is told of the cases of a study's mission with one of its estimators."""
+    mission = mission_from_text(study.manifest["mission_text"], str(study.folder))
+    measure = ATTITUDE if estimator in study.manifest.get("attitude_filters", ()) else HEADING
+    return measure.summaries(windows_of(mission))
 
 
-def _attitude_figures(cases: pa.Table) -> dict[str, Any]:
-    names = [name for name in ATTITUDE.figures if name != "attitude_error_max_deg"]
-    return {
-        **{name: _mean(cases, name) for name in names},
-        "attitude_error_max_deg": pc.max(cases["attitude_error_max_deg"]).as_py(),
-        "steps_without_estimate": _mean(cases, "steps_without_estimate"),
-    }
-
-
-def _mean(cases: pa.Table, name: str) -> float | None:
-    values = cases[name].drop_null().to_numpy()
-    return float(np.mean(values)) if len(values) else None
+def _over(cases: pa.Table, summary: Summary) -> float | None:
+    known = cases[summary.of].drop_null().to_numpy()
+    if summary.over == "share":
+        return len(known) / cases.num_rows
+    if not len(known):
+        return None
+    return float(np.max(known) if summary.over == "max" else np.mean(known))

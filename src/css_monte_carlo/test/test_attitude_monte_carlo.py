@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from css_analysis.estimate_errors import attitude_errors
-from css_analysis.flight_metrics import estimator_runs
+from css_analysis.estimator_runs import estimator_runs
+from css_analysis.flight_metrics import windows_of
 from css_common.attitude import mrp_to_quaternion
 from css_common.mission import load_mission, mission_from_text
-from css_monte_carlo.attitude_table import attitude_table
+from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import BIN_DEG
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import fly_directly
@@ -37,6 +38,7 @@ LIT = ("css_array.albedo.enabled=true", "attitude_voltage.albedo.compensate=true
 BESIDE = """/**:
   ros__parameters:
     mission: {name: beside, duration: 400.0, period: 1.0}
+    measures: {settled_time: 300.0}
     graph:
       nodes: [css_sim/dynamics, css_sim/css_array, css_sim/gyro, css_sim/magnetometer, css_estimation/ekf,
               "css_estimation/attitude_filter:attitude_voltage", sunpoint_control/mrp_control]
@@ -95,13 +97,16 @@ def test_a_case_is_the_flight_of_the_nodes_bit_for_bit(variant):
 def check_figures(flight, tallies, log, name):
     """Row 1 of the tallies against what is measured in the flight's log."""
     steps, errors, _ = attitude_errors(log, name)
-    row = attitude_table(np.arange(2), tallies, 1.0).to_pylist()[1]
+    windows = windows_of(flight.mission)
+    row = case_table(np.arange(2), tallies, 1.0, windows).to_pylist()[1]
     samples = np.array(row["attitude_error_deg"])
     np.testing.assert_allclose(samples[steps], np.degrees(errors), rtol=1e-6, atol=1e-6)
     run = next(run for run in estimator_runs(log) if run["estimator"] == name)
     assert row["attitude_error_mean_deg"] == pytest.approx(run["attitude_error_mean_deg"], rel=1e-12)
     assert row["attitude_error_p95_deg"] == pytest.approx(run["attitude_error_p95_deg"], abs=2 * BIN_DEG, rel=0.01)
-    assert row["attitude_error_max_deg"] == pytest.approx(np.degrees(errors[steps >= 300].max()), rel=1e-12)
+    assert row["attitude_error_max_deg"] == pytest.approx(
+        np.degrees(errors[steps >= windows.settled_time].max()), rel=1e-12
+    )
     assert row["attitude_nees"] == pytest.approx(run["attitude_nees"], rel=1e-12)
     assert row["steps_without_estimate"] == run["steps_without_estimate"]
     assert row["first_attitude_s"] == steps[0]

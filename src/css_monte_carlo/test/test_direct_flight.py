@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from synthetic_flight import record
 
+from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import read_flight
-from css_analysis.flight_metrics import estimator_runs, sunlit_passes
+from css_analysis.flight_metrics import sunlit_passes
 from css_common.mission import default_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_monte_carlo.direct_flight import configured, fly_directly

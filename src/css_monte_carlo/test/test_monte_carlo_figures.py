@@ -5,9 +5,11 @@ import numpy as np
 import pytest
 
 from css_analysis.estimate_errors import tangent_nees
-from css_analysis.flight_metrics import acquisition, estimator_runs, sunlit_passes
-from css_common.mission import default_mission
-from css_monte_carlo.case_table import case_table, percentile_of_histogram
+from css_analysis.estimator_runs import estimator_runs
+from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes, windows_of
+from css_analysis.quantities import percentile_of_histogram
+from css_common.mission import load_mission
+from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import BIN_DEG, SAMPLED, sample_count, step_marks
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import configured, fly_directly
@@ -15,7 +17,7 @@ from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.percentiles import over_cases
 
 # A cycle of 1 s keeps an orbit with its eclipse short; without gyro there is something to converge after it.
-ORBIT = default_mission().with_overrides(["mission.period=1.0", "mrp_control.gains.p=0.5"])
+ORBIT = load_mission("okeefe_2013").with_overrides(["mission.period=1.0", "mrp_control.gains.p=0.5"])
 CASES = np.arange(3)
 
 
@@ -26,7 +28,7 @@ def flown(request):
     mission = configured(ORBIT, estimator=estimator, gyro=gyro)
     flight = MissionFlight(mission)
     tallies = fly_cases(flight, CASES, 10).tallies
-    rows = case_table(CASES, tallies, 1.0).to_pylist()
+    rows = case_table(CASES, tallies, 1.0, windows_of(mission)).to_pylist()
     return estimator, rows, [fly_directly(configured(mission, case=int(c), gyro=gyro)) for c in CASES]
 
 
@@ -86,14 +88,14 @@ def test_samples_are_those_of_the_log(flown):
 
 def test_short_flights_have_no_rates_at_fifty_minutes():
     flight = MissionFlight(ORBIT.with_overrides(["mission.duration=40"]))
-    (row,) = case_table(np.arange(1), fly_cases(flight, np.arange(1), 10).tallies, 1.0).to_pylist()
+    (row,) = case_table(np.arange(1), fly_cases(flight, np.arange(1), 10).tallies, 1.0, windows_of(ORBIT)).to_pylist()
     for key in ("rate_50min_deg_s", "rate_knowledge_50min_deg_s", "acquired_s", "heading_error_mean_deg"):
         assert row[key] is None
 
 
 def test_marks_of_a_flight_that_begins_in_the_shadow():
     illumination = np.array([0.0, 0.4, 0.6, 1.0, 0.0, 1.0])
-    assert (step_marks(illumination, 1.0) & 3).tolist() == [0, 0, 3, 3, 0, 1]
+    assert (step_marks(illumination, 1.0, Windows()) & 3).tolist() == [0, 0, 3, 3, 0, 1]
 
 
 def test_percentiles_over_cases_are_numpys():
@@ -115,5 +117,7 @@ def test_percentile_of_a_histogram_is_within_a_bin():
     errors = np.random.default_rng(6).gamma(2.0, 2.0, size=5000)
     counts = np.bincount((errors / BIN_DEG).astype(int), minlength=9000)
     for percent in (5.0, 50.0, 95.0, 100.0):
-        assert percentile_of_histogram(counts, percent) == pytest.approx(np.percentile(errors, percent), abs=BIN_DEG)
-    assert np.isnan(percentile_of_histogram(np.zeros(10, int), 95.0))
+        assert percentile_of_histogram(counts, percent, BIN_DEG) == pytest.approx(
+            np.percentile(errors, percent), abs=BIN_DEG
+        )
+    assert np.isnan(percentile_of_histogram(np.zeros(10, int), 95.0, BIN_DEG))

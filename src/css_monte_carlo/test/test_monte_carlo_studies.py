@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 import pytest
 
-from css_common.mission import default_mission
+from css_common.mission import load_mission
 from css_monte_carlo import study
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.schedulers import ChunkResult, DaskScheduler, Scheduler, ThreadScheduler, run_task
@@ -19,7 +19,7 @@ from css_monte_carlo.study_folder import StudyError
 from css_monte_carlo.study_summary import rows_of, study_object
 
 # A coarse cycle keeps flights short; what is tested here does not depend on it.
-MISSION = default_mission().with_overrides(["mission.period=1.0", "mission.duration=120.0"])
+MISSION = load_mission("okeefe_2013").with_overrides(["mission.period=1.0", "mission.duration=120.0"])
 CONFIGURATIONS = (
     Configuration("ekf", True),
     Configuration("ekf", False, ("css_array.scale_cell_error=0.1",)),
@@ -116,11 +116,11 @@ def test_complete_study_is_read_not_flown(whole):
 
 def test_killed_process_leaves_a_study_that_goes_on(whole, tmp_path, monkeypatch):
     program = f"""
-from css_common.mission import default_mission
+from css_common.mission import load_mission
 from css_monte_carlo import study
 from css_monte_carlo.study import Configuration, run_study
 study.CHUNK_CASES = 1
-mission = default_mission().with_overrides({["mission.period=1.0", "mission.duration=120.0"]!r})
+mission = load_mission("okeefe_2013").with_overrides({["mission.period=1.0", "mission.duration=120.0"]!r})
 configurations = [Configuration(*c) for c in {[tuple(c) for c in CONFIGURATIONS]!r}]
 run_study(
     mission, configurations, {CASES}, {str(tmp_path / "s")!r}, threads=1,

@@ -8,6 +8,7 @@ import pytest
 from matplotlib import image
 from synthetic_study import case_table, percentile_table
 
+from css_analysis.flight_metrics import Windows
 from css_common.mission import load_mission
 from css_monte_carlo.study import Configuration, Study, read_study
 from css_papers.commands.reproduce import main
@@ -21,6 +22,7 @@ from css_papers.study_columns import column, curve
 
 ENGINE_QUANTITIES = {"heading error at the end", "rate at 50 min", "rate error at 50 min", "longest converging"}
 A, B = Configuration("wavg", True), Configuration("wavg", True, ("css_array.scale=0.8", "wavg.gate=0"))
+WINDOWS = Windows(late_time=300.0, report_time=3000.0)
 LIGHT = Shadow(np.array([0.0]), np.array([False]))
 GOOD = {
     "heading_error_late_deg": [4.5, 5.5, 5.0],
@@ -42,7 +44,7 @@ def rows_of(values, is_printed):
     """Rows of one configuration by quantity."""
     tables = case_table([A], 3, {A: values}), percentile_table([A], np.arange(0.0, 3600.0, 10.0))
     entry = AS_PRINTED[0]._replace(configuration=A)
-    return {row.quantity: row for row in flight_rows(Variant("improved", is_printed, [entry], *tables), LIGHT)}
+    return {row.quantity: row for row in flight_rows(Variant("improved", is_printed, [entry], *tables), LIGHT, WINDOWS)}
 
 
 def test_figures_of_merit_of_one_configuration_among_several():
@@ -81,11 +83,11 @@ def test_when_it_is_dark_at_fifty_minutes_the_note_tells_of_the_light_before():
     entry = Entry("average, no gyro", "black", Configuration("wavg", False))
     tables = case_table([entry.configuration], 2), percentile_table([entry.configuration], time_s, lambda c, q, t: t)
     variant = Variant("as the paper", True, [entry], *tables)
-    notes = {row.quantity: row.note for row in flight_rows(variant, dark)}
+    notes = {row.quantity: row.note for row in flight_rows(variant, dark, WINDOWS)}
     # the minute from 1910 to 1970 s, half a minute before the light ends
     assert "at 33 min, it errs by 1945" in notes["average, no gyro: rate error at 50 min"]
     light = Shadow(time_s, np.zeros(len(time_s), bool))
-    assert not any(row.note for row in flight_rows(variant, light))
+    assert not any(row.note for row in flight_rows(variant, light, WINDOWS))
 
 
 def test_the_improved_must_beat_what_is_printed():

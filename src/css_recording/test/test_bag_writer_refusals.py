@@ -217,10 +217,14 @@ def test_misuse_is_named(flight, tmp_path):
 
 
 def test_an_error_in_flight_still_finishes_the_recording(flight, tmp_path):
-    with pytest.raises(ZeroDivisionError), BagWriter(tmp_path / "bag", flight.topics) as writer:
-        for message in flight.messages(15):
-            writer.write(*message)
-        _ = 1 / 0
+    def fail_in_flight():
+        with BagWriter(tmp_path / "bag", flight.topics) as writer:
+            for message in flight.messages(15):
+                writer.write(*message)
+            _ = 1 / 0
+
+    with pytest.raises(ZeroDivisionError):
+        fail_in_flight()
     with BagReader(tmp_path / "bag") as reader:
         assert reader.message_count == 45
 

@@ -16,6 +16,7 @@ Where several apply, the first in this list is taken.
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from css_common.kernel import kernel
@@ -135,7 +136,7 @@ def parameters(values: Values) -> ModeParameters:
     )
 
 
-def conflicts(values: Values):
+def conflicts(values: Values) -> Iterator[str]:
     """Thresholds whose hysteresis is upside down, one message each."""
     m = values.modes
     if m.detumble_exit_rate_deg_s > m.detumble_rate_deg_s:

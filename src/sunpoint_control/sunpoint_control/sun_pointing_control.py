@@ -6,6 +6,7 @@ more harm than coasting.
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from css_common.kernel import kernel
@@ -108,7 +109,7 @@ def parameters(values: Values) -> ControlParameters:
     )
 
 
-def conflicts(values: Values):
+def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between parameters, one message each."""
     yield from modes.conflicts(values)
     if not values.wheels.fitted:

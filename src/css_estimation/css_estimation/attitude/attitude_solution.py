@@ -73,8 +73,8 @@ class AttitudeSolution(NamedTuple):
 
 def initial_state(p: AttitudeParameters) -> AttitudeState:
     """Nothing known, or the given attitude."""
-    given = p.given.is_given
-    return AttitudeState(given, given, p.given.sigma_bn if given else _ZERO, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0)
+    given = p.start.is_given
+    return AttitudeState(given, given, p.start.sigma_bn if given else _ZERO, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0)
 
 
 def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
@@ -82,9 +82,9 @@ def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
     cells = len(p.cells.layout.cells)
     largest = largest_variances(p)
     covariance = np.diag(np.full(len(largest), LOST_VARIANCE))
-    if p.given.is_given:
+    if p.start.is_given:
         for i in range(3):
-            covariance[i, i] = p.given.variance
+            covariance[i, i] = p.start.variance
     for i in range(3, CALIBRATION):
         covariance[i, i] = p.bias_variance
     c = p.cells.calibration

@@ -13,7 +13,10 @@ contradicting cells it never looks at. Safe are
 
 from typing import NamedTuple
 
+from css_common.conversions import square
+from css_common.declared import computed, given, made, part
 from css_common.kernel import kernel
+from css_common.schema import choice, real
 from css_common.vectors import Vec3, cross, dot, scale
 from css_estimation.sun.cell_calibration import (
     SCALE,
@@ -21,18 +24,33 @@ from css_estimation.sun.cell_calibration import (
     calibrated_normal,
     calibration_partials,
 )
-from css_estimation.sun.cell_layout import CellLayout, sees
+from css_estimation.sun.cell_layout import CellLayout, cell_layout, sees
 from css_estimation.sun.error_covariance import CALIBRATION, Partials
 
 
 class CellModel(NamedTuple):
     """How outputs are predicted."""
 
-    layout: CellLayout
-    calibration: CellCalibration
-    expected_too: bool  # use cells that should be lit but are not
-    variance: float  # of an output, all causes
-    albedo_share: float  # error of a predicted albedo, relative, 1 sigma
+    layout: CellLayout = computed(cell_layout)
+    expected_too: bool = made(  # use cells that should be lit but are not
+        lambda word: word == "lit_or_expected",
+        choice(
+            "cells_used",
+            "lit_or_expected",
+            ("lit_or_expected", "lit"),
+            "voltage model: cells that are lit or should be, or those that are lit",
+        ),
+    )
+    variance: float = made(  # of an output, all causes
+        square,
+        real(
+            "cell_sigma", 0.02, "-", "cell error, all causes, 1 sigma", low=0.0, open_low=True, high=10.0, tunable=True
+        ),
+    )
+    albedo_share: float = given(
+        real("albedo.share_sigma", 0.3, "-", "error of a predicted albedo, relative, 1 sigma", low=0.0, high=10.0)
+    )
+    calibration: CellCalibration = part(CellCalibration)
 
 
 class CellMeasurement(NamedTuple):

@@ -9,33 +9,50 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import built, given, made, table_of
 from css_common.epochs import parse_utc
 from css_common.kernel import typed_call
-from css_common.schema import Table, Values, choice, flag, integer, real, reals
-from css_common.vectors import Vec3, add
+from css_common.schema import Values, choice, flag, integer, real, reals
+from css_common.vectors import Vec3, add, vector_of
 from css_environment.earth_light import albedo_sources, new_earth_view, new_light
 from css_environment.magnetic_field import HIGHEST_DEGREE
 from css_environment.mission_environment import MissionEnvironment
 from css_environment.reflectivity import named_reflectivity
 
-PARAMETERS: Table = (
-    integer(
-        "reference.field_degree", HIGHEST_DEGREE, "-", "highest degree of the field model", low=1, high=HIGHEST_DEGREE
-    ),
-    reals("reference.field_offset_nt", (0.0, 0.0, 0.0), "nT", "error put on the field model, in n", length=3),
-    flag("albedo.compensate", False, "take the predicted light of the Earth off each cell's output"),
-    choice(
-        "albedo.reflectivity",
-        "zonal",
-        ("zonal", "knocke", "constant"),
-        "the Earth of the prediction: annual means by latitude, seasonal model by latitude, one value",
-    ),
-    real("albedo.constant", 0.3, "-", "the one value", low=0.0, high=1.0),
-    real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0),
-    real("albedo.share_sigma", 0.3, "-", "error of a predicted albedo, relative, 1 sigma", low=0.0, high=10.0),
+FIELD_DEGREE = integer(
+    "reference.field_degree", HIGHEST_DEGREE, "-", "highest degree of the field model", low=1, high=HIGHEST_DEGREE
 )
+COMPENSATE = flag("albedo.compensate", False, "take the predicted light of the Earth off each cell's output")
 
 _FULL_DISC = 0.99
+
+
+def _tesla(field_nt: np.ndarray) -> Vec3:
+    return vector_of(1e-9 * field_nt)
+
+
+class ReferenceParameters(NamedTuple):
+    """Of the flight's own models."""
+
+    field_degree: int = given(FIELD_DEGREE)
+    field_offset_n: Vec3 = made(  # [T]
+        _tesla,
+        reals("reference.field_offset_nt", (0.0, 0.0, 0.0), "nT", "error put on the field model, in n", length=3),
+    )
+    compensate: bool = given(COMPENSATE)
+    reflectivity: str = given(
+        choice(
+            "albedo.reflectivity",
+            "zonal",
+            ("zonal", "knocke", "constant"),
+            "the Earth of the prediction: annual means by latitude, seasonal model by latitude, one value",
+        )
+    )
+    constant: float = given(real("albedo.constant", 0.3, "-", "the one value", low=0.0, high=1.0))
+    factor: float = given(real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0))
+
+
+PARAMETERS = table_of(ReferenceParameters)
 
 
 class References(NamedTuple):
@@ -56,13 +73,12 @@ class FlightReferences:
 
     def __init__(self, values: Values) -> None:
         """Takes sections mission and orbit, and `PARAMETERS`."""
-        self._environment = MissionEnvironment(values, field=True, field_degree=values.reference.field_degree)
-        x, y, z = (1e-9 * values.reference.field_offset_nt).tolist()
-        self._offset_n: Vec3 = (x, y, z)
-        albedo = values.albedo
-        self._compensate: bool = albedo.compensate
-        grid = named_reflectivity(albedo.reflectivity, albedo.constant, parse_utc(values.mission.epoch))
-        self._reflectivity = np.minimum(albedo.factor * grid.mean, 1.0)
+        p = built(ReferenceParameters, values)
+        self._environment = MissionEnvironment(values, field=True, field_degree=p.field_degree)
+        self._offset_n = p.field_offset_n
+        self._compensate = p.compensate
+        grid = named_reflectivity(p.reflectivity, p.constant, parse_utc(values.mission.epoch))
+        self._reflectivity = np.minimum(p.factor * grid.mean, 1.0)
         self.light = new_light()
         self._view = new_earth_view()
         self._sources = typed_call(albedo_sources)

@@ -6,6 +6,7 @@ from types import ModuleType
 from typing import ClassVar
 
 from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.declared import merged
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
@@ -21,7 +22,7 @@ class AttitudeFilter(Component):
 
     algorithm: ClassVar[ModuleType] = attitude_ekf
     shared = ("cells", "orbit", "magnetometer")
-    parameters = (*attitude_options.PARAMETERS, *flight_references.PARAMETERS)
+    parameters = merged(attitude_options.PARAMETERS, flight_references.PARAMETERS)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:

@@ -14,22 +14,21 @@ from css_common.schema import Values, real, reals
 from css_estimation.spin.coning import Coning as ConingResult
 from css_estimation.spin.coning import Passages, analyse_coning
 from css_estimation.spin.coning_spectrum import MOST_CANDIDATES
+from css_estimation.spin.slit_measurement import INERTIA_RATIO
 from css_msgs.msg import ConingEstimate, SlitSunAngle
 
 _COLUMNS = len(Passages._fields)
+_LEGS = reals(
+    "legs", (0.0, 1e6), "s", "windows of steady motion after the epoch, a row of start and end each", columns=2
+)
+_INTERVAL = real("interval", 30.0, "s", "time from estimate to estimate within a leg", low=0.1, high=1e6)
 
 
 class Coning(Component):
     """Coning angle, period and its aliases over each leg: again and again while the leg lasts, and at its end."""
 
     shared = ("slits",)
-    parameters = (
-        reals(
-            "legs", (0.0, 1e6), "s", "windows of steady motion after the epoch, a row of start and end each", columns=2
-        ),
-        real("interval", 30.0, "s", "time from estimate to estimate within a leg", low=0.1, high=1e6),
-        real("inertia_ratio", 0.0, "-", "axial over transverse moment of inertia; 0: unknown", low=0.0, high=2.0),
-    )
+    parameters = (_LEGS, _INTERVAL, INERTIA_RATIO)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -41,8 +40,8 @@ class Coning(Component):
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
-        edges = values.legs.ravel()
-        if not len(edges) or np.any(np.diff(edges) < 0.0) or np.any(values.legs[:, 0] == values.legs[:, 1]):
+        edges = values[_LEGS].ravel()
+        if not len(edges) or np.any(np.diff(edges) < 0.0) or np.any(values[_LEGS][:, 0] == values[_LEGS][:, 1]):
             yield f"legs: {edges.tolist()} given, expected rows of start and end, one after the other"
 
     def configure(self) -> None:
@@ -59,14 +58,14 @@ class Coning(Component):
         assert angle is not None  # a required input
         now = (stamp_ns - self.epoch_ns) * 1e-9
         fresh = False
-        if self._leg < len(self.values.legs):
-            start, end = self.values.legs[self._leg].tolist()
+        if self._leg < len(self.values[_LEGS]):
+            start, end = self.values[_LEGS][self._leg].tolist()
             if angle.validity == SlitSunAngle.VALIDITY_VALID:
                 self._take(angle, now, start, end)
             over = now >= end
             if over or now >= self._due:
                 fresh = self._analyse(complete=over)
-                self._due = now + self.values.interval
+                self._due = now + self.values[_INTERVAL]
             if over:
                 self._leg += 1
                 self._rows.clear()
@@ -78,7 +77,7 @@ class Coning(Component):
         if not start <= time < end:
             return
         if not self._rows:
-            self._due = now + self.values.interval
+            self._due = now + self.values[_INTERVAL]
         frequency = self.values.slits.counter_hz
         upper = _signed(angle.upper - angle.vertical) / frequency
         self._rows.append(
@@ -89,7 +88,7 @@ class Coning(Component):
         columns = np.array(self._rows).reshape(-1, _COLUMNS).T
         # several of one cycle may have come in another order
         passages = Passages(*columns[:, np.argsort(columns[0], kind="stable")])
-        result = analyse_coning(passages, self._inclination, self.values.inertia_ratio)
+        result = analyse_coning(passages, self._inclination, self.values[INERTIA_RATIO])
         if result is None:
             return False
         self._fields = {**estimate_fields(result), "leg": self._leg, "complete": int(complete)}

@@ -14,7 +14,7 @@ from css_common.run import node_main
 from css_common.schema import Values
 from css_estimation.spin import slit_measurement, slit_passage
 from css_estimation.spin.slit_measurement import HALF_COUNT, SunAngle
-from css_estimation.spin.slit_passage import REASON_NONE, REASON_UNKNOWN, Passage
+from css_estimation.spin.slit_passage import HIGHEST_SPIN, LOWEST_SPIN, REASON_NONE, REASON_UNKNOWN, Passage
 from css_estimation.spin.slit_timer_counts import UnwrappedTimer
 from css_estimation.symmetric import row_major
 from css_msgs.msg import SlitPulses, SlitSunAngle
@@ -39,9 +39,9 @@ class SlitPassages(Component):
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
-        if values.lowest_spin_hz >= values.highest_spin_hz:
-            yield f"lowest_spin_hz: {values.lowest_spin_hz:g} given, expected less than highest_spin_hz"
-        passages = len(values.slits.head_azimuths_deg) * values.highest_spin_hz
+        if values[LOWEST_SPIN] >= values[HIGHEST_SPIN]:
+            yield f"lowest_spin_hz: {values[LOWEST_SPIN]:g} given, expected less than highest_spin_hz"
+        passages = len(values.slits.head_azimuths_deg) * values[HIGHEST_SPIN]
         if passages * values.mission.period > 1.0:
             yield (
                 f"highest_spin_hz: up to {passages:g} passages a second are more than one in a mission.period of "

@@ -22,6 +22,7 @@ from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
 
 _ORDERS = {"best": ORDER_BEST, "sun": ORDER_SUN, "field": ORDER_FIELD}
+_PRIMARY = choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; best: that with the smaller covariance")
 
 
 class _Sighting(NamedTuple):
@@ -46,8 +47,8 @@ class Triad(Component):
 
     shared = ("orbit", "magnetometer")
     parameters = (
-        *(p for p in flight_references.PARAMETERS if p.name == "reference.field_degree"),
-        choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; best: that with the smaller covariance"),
+        flight_references.FIELD_DEGREE,
+        _PRIMARY,
     )
 
     @classmethod
@@ -71,9 +72,11 @@ class Triad(Component):
             )
 
     def configure(self) -> None:
-        self._environment = MissionEnvironment(self.values, field=True, field_degree=self.values.reference.field_degree)
+        self._environment = MissionEnvironment(
+            self.values, field=True, field_degree=self.values[flight_references.FIELD_DEGREE]
+        )
         self._spacing_ns = self.period_ns * self.values.magnetometer.divider
-        self._order = _ORDERS[self.values.primary]
+        self._order = _ORDERS[self.values[_PRIMARY]]
         self._samples: deque[_FieldSample] = deque(maxlen=64)
         self._sightings: deque[_Sighting] = deque(maxlen=64)
         self._newest: dict[str, Any] | None = None
@@ -124,7 +127,8 @@ class Triad(Component):
 
     def _solve(self, sighting: _Sighting, around: list[_FieldSample]) -> bool:
         u = (sighting.instant_ns - around[1].stamp_ns) / self._spacing_ns
-        field_b = self._interpolated(*(sample.field_b for sample in around), u)
+        before, left, right, after = (sample.field_b for sample in around)
+        field_b = self._interpolated(before, left, right, after, u)
         turn = sighting.rate * self._spacing_ns * 1e-9
         variance = self._variance(max(sample.variance for sample in around), norm(field_b), turn, u)
         at = self._environment.at((sighting.instant_ns - self.epoch_ns) * 1e-9)

@@ -4,19 +4,19 @@
 import math
 from typing import NamedTuple
 
+from css_common.conversions import square_of_degrees
+from css_common.declared import builder, computed, given, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, real
+from css_common.schema import Values, real
 from css_common.vectors import Vec3
-from css_estimation.spin import slit_angles, slit_passage
+from css_estimation.spin import slit_angles
 from css_estimation.spin.slit_passage import Passage, PassageParameters
 from css_estimation.symmetric import Symmetric
 
-PARAMETERS: Table = (
-    *slit_passage.PARAMETERS,
-    real("inertia_ratio", 0.0, "-", "axial over transverse moment of inertia; 0: unknown", low=0.0, high=2.0),
-    real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4),
-    real("coning_prior_deg", 5.0, "deg", "1 sigma of the Sun angle's swing before it is known", low=0.0, high=45.0),
+INERTIA_RATIO = real(
+    "inertia_ratio", 0.0, "-", "axial over transverse moment of inertia; 0: unknown", low=0.0, high=2.0
 )
+_JITTER = real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4)
 
 # A cut count lies half a count before the pulse, on average.
 HALF_COUNT = 0.5
@@ -25,15 +25,34 @@ _WEIGHT = 0.03
 _PRIOR_SAMPLES = 3
 
 
-class SlitParameters(NamedTuple):
-    """Built by `parameters`."""
+def _frequency(values: Values) -> float:
+    return float(values.slits.counter_hz)
 
-    passage: PassageParameters
-    frequency: float  # [Hz]
-    inclination: float  # [rad]
-    inertia_ratio: float
-    jitter: float  # [counts]
-    prior_variance: float  # [rad^2]
+
+def _inclination(values: Values) -> float:
+    return math.radians(values.slits.inclination_deg)
+
+
+def _jitter(values: Values) -> float:
+    return 1e-6 * values[_JITTER] * _frequency(values)
+
+
+class SlitParameters(NamedTuple):
+    """All of the measurement, with the mission's `slits`."""
+
+    passage: PassageParameters = part(PassageParameters)
+    frequency: float = computed(_frequency)  # [Hz]
+    inclination: float = computed(_inclination)  # [rad]
+    inertia_ratio: float = given(INERTIA_RATIO)
+    jitter: float = computed(_jitter, _JITTER)  # [counts]
+    prior_variance: float = made(  # [rad^2]
+        square_of_degrees,
+        real("coning_prior_deg", 5.0, "deg", "1 sigma of the Sun angle's swing before it is known", low=0.0, high=45.0),
+    )
+
+
+PARAMETERS = table_of(SlitParameters)
+parameters = builder(SlitParameters)
 
 
 class Swing(NamedTuple):
@@ -52,18 +71,6 @@ class SunAngle(NamedTuple):
     angle: float  # [rad]
     sigma: float  # [rad]
     rate: float  # [rad/s]
-
-
-def parameters(values: Values) -> SlitParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `slits`)."""
-    return SlitParameters(
-        slit_passage.parameters(values),
-        values.slits.counter_hz,
-        math.radians(values.slits.inclination_deg),
-        values.inertia_ratio,
-        1e-6 * values.jitter_us * values.slits.counter_hz,
-        math.radians(values.coning_prior_deg) ** 2,
-    )
 
 
 def initial_swing(p: SlitParameters) -> Swing:

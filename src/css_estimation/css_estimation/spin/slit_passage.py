@@ -5,18 +5,18 @@ A passage holds one pulse of each slit within half a turn; between passages the 
 pulse or passage that is refused has its reason.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
+from css_common.declared import computed, given
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, integer, real
+from css_common.schema import Parameter, Values, integer, real
 
-PARAMETERS: Table = (
-    real("lowest_spin_hz", 0.2, "Hz", "slowest spin: a longer time between upper pulses is no turn", low=0.001),
-    real("highest_spin_hz", 20.0, "Hz", "fastest spin: a shorter time between upper pulses is no turn", low=0.002),
-    real(
-        "turn_change", 0.2, "-", "largest believable change of RCOUNT from turn to turn, relative", low=0.001, high=1.0
-    ),
-    integer("confirmations", 3, "-", "turns in agreement after which a larger change is believed", low=1, high=100),
+LOWEST_SPIN = real(
+    "lowest_spin_hz", 0.2, "Hz", "slowest spin: a longer time between upper pulses is no turn", low=0.001
+)
+HIGHEST_SPIN = real(
+    "highest_spin_hz", 20.0, "Hz", "fastest spin: a shorter time between upper pulses is no turn", low=0.002
 )
 
 UPPER, VERTICAL, LOWER = 0, 1, 2
@@ -55,13 +55,29 @@ _GAP = 0.45
 _DISORDER = 0.02
 
 
+def _turn_of(spin: Parameter[float]) -> Callable[[Values], int]:
+    """Length [counts] of a turn at a spin."""
+    return lambda values: int(values.slits.counter_hz / values[spin])
+
+
 class PassageParameters(NamedTuple):
     """Limits; turns in counts."""
 
-    shortest_turn: int
-    longest_turn: int
-    turn_change: float
-    confirmations: int
+    longest_turn: int = computed(_turn_of(LOWEST_SPIN), LOWEST_SPIN)
+    shortest_turn: int = computed(_turn_of(HIGHEST_SPIN), HIGHEST_SPIN)
+    turn_change: float = given(
+        real(
+            "turn_change",
+            0.2,
+            "-",
+            "largest believable change of RCOUNT from turn to turn, relative",
+            low=0.001,
+            high=1.0,
+        )
+    )
+    confirmations: int = given(
+        integer("confirmations", 3, "-", "turns in agreement after which a larger change is believed", low=1, high=100)
+    )
 
 
 class HeadState(NamedTuple):
@@ -87,17 +103,6 @@ class Passage(NamedTuple):
     turn: int  # RCOUNT
     upper: int  # count at the upper pulse
     vertical: int  # count at the vertical pulse
-
-
-def parameters(values: Values) -> PassageParameters:
-    """Limits from checked values (`PARAMETERS` and the mission's `slits`)."""
-    frequency = values.slits.counter_hz
-    return PassageParameters(
-        shortest_turn=int(frequency / values.highest_spin_hz),
-        longest_turn=int(frequency / values.lowest_spin_hz),
-        turn_change=values.turn_change,
-        confirmations=values.confirmations,
-    )
 
 
 def initial_state() -> HeadState:

@@ -6,30 +6,16 @@ n0. What is calibrated of each cell follows the six errors of attitude and bias:
 corrected; considered, they keep their value and variance and only make the filter trust the cells less.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
+from css_common.conversions import cosine_of_degrees, square, square_of_degrees
+from css_common.declared import made
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, flag, real
+from css_common.schema import choice, flag, real
 from css_common.vectors import Vec3, add, axes_across, dot, scale, unit
 from css_estimation.sun.error_covariance import CALIBRATION
-
-PARAMETERS: Table = (
-    choice(
-        "calibration.mode",
-        "off",
-        ("off", "estimate", "consider"),
-        "errors of each cell: none, estimated with the attitude, or considered as a source of error",
-    ),
-    flag("calibration.alignment", False, "besides the scale of each cell, also its two alignment angles"),
-    real("calibration.scale_sigma", 0.1, "-", "scale error at the start, 1 sigma", low=0.0, high=1.0),
-    real("calibration.alignment_sigma_deg", 2.0, "deg", "alignment error at the start, 1 sigma", low=0.0, high=30.0),
-    real("calibration.scale_walk", 1e-6, "1/sqrt(s)", "drift of each scale, 1 sigma", low=0.0, high=1.0),
-    real("calibration.alignment_walk_deg", 0.0, "deg/sqrt(s)", "drift of each angle, 1 sigma", low=0.0, high=1.0),
-    real("calibration.largest_incidence_deg", 70.0, "deg", "no calibration beyond it", low=0.0, high=90.0),
-)
 
 SCALE, TILT_1, TILT_2 = 0, 1, 2
 """Columns of the calibration of the cells, (N, 3)."""
@@ -38,30 +24,55 @@ _SMALLEST_SCALE, _LARGEST_SCALE = 0.1, 3.0
 _LARGEST_TILT = 0.5
 
 
+_MODE = choice(
+    "calibration.mode",
+    "off",
+    ("off", "estimate", "consider"),
+    "errors of each cell: none, estimated with the attitude, or considered as a source of error",
+)
+_ALIGNMENT = flag("calibration.alignment", False, "besides the scale of each cell, also its two alignment angles")
+
+
+def _per_cell(mode: str, alignment: bool) -> int:
+    return 0 if mode == "off" else 3 if alignment else 1
+
+
+def _scale_variance(mode: str, sigma: float) -> float:
+    return 0.0 if mode == "off" else sigma**2
+
+
+def _alignment_variance(mode: str, alignment: bool, sigma_deg: float) -> float:
+    return 0.0 if mode == "off" or not alignment else square_of_degrees(sigma_deg)
+
+
 class CellCalibration(NamedTuple):
     """What is calibrated, and how it errs."""
 
-    per_cell: int  # errors of each cell: 0, 1 or 3
-    estimated: bool
-    scale_variance: float
-    alignment_variance: float  # [rad^2]
-    scale_noise: float  # [1/s]
-    alignment_noise: float  # [rad^2/s]
-    least_cosine: float  # of the incidence up to which a cell calibrates
-
-
-def parameters(values: Values) -> CellCalibration:
-    """Parameters from checked values (`PARAMETERS`)."""
-    c = values.calibration
-    off = c.mode == "off"
-    return CellCalibration(
-        per_cell=0 if off else 3 if c.alignment else 1,
-        estimated=c.mode == "estimate",
-        scale_variance=0.0 if off else c.scale_sigma**2,
-        alignment_variance=0.0 if off or not c.alignment else math.radians(c.alignment_sigma_deg) ** 2,
-        scale_noise=c.scale_walk**2,
-        alignment_noise=math.radians(c.alignment_walk_deg) ** 2,
-        least_cosine=math.cos(math.radians(c.largest_incidence_deg)),
+    per_cell: int = made(_per_cell, _MODE, _ALIGNMENT)  # errors of each cell: 0, 1 or 3
+    estimated: bool = made(lambda mode: mode == "estimate", _MODE)
+    scale_variance: float = made(
+        _scale_variance,
+        _MODE,
+        real("calibration.scale_sigma", 0.1, "-", "scale error at the start, 1 sigma", low=0.0, high=1.0),
+    )
+    alignment_variance: float = made(  # [rad^2]
+        _alignment_variance,
+        _MODE,
+        _ALIGNMENT,
+        real(
+            "calibration.alignment_sigma_deg", 2.0, "deg", "alignment error at the start, 1 sigma", low=0.0, high=30.0
+        ),
+    )
+    scale_noise: float = made(  # [1/s]
+        square, real("calibration.scale_walk", 1e-6, "1/sqrt(s)", "drift of each scale, 1 sigma", low=0.0, high=1.0)
+    )
+    alignment_noise: float = made(  # [rad^2/s]
+        square_of_degrees,
+        real("calibration.alignment_walk_deg", 0.0, "deg/sqrt(s)", "drift of each angle, 1 sigma", low=0.0, high=1.0),
+    )
+    least_cosine: float = made(  # of the incidence up to which a cell calibrates
+        cosine_of_degrees,
+        real("calibration.largest_incidence_deg", 70.0, "deg", "no calibration beyond it", low=0.0, high=90.0),
     )
 
 

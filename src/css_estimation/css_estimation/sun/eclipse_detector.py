@@ -9,8 +9,9 @@ orbit model can be wrong by its ephemeris. With `both`, an eclipse needs the two
 
 from typing import NamedTuple
 
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, real
+from css_common.schema import choice, real
 from css_estimation.sun.sun_heading import (
     ECLIPSE_ECLIPSED,
     ECLIPSE_SUNLIT,
@@ -18,29 +19,29 @@ from css_estimation.sun.sun_heading import (
     PREDICTION_UNKNOWN,
 )
 
-PARAMETERS: Table = (
-    choice(
-        "eclipse.source", "sensors", ("sensors", "model", "both"), "who decides on eclipse; both: the two must agree"
-    ),
-    real("eclipse.dark_level", 0.12, "-", "brightest output below which it is dark", low=0.0, high=1.0),
-    real("eclipse.dark_time", 10.0, "s", "darkness that begins an eclipse", low=0.0, high=1e4),
-    real("eclipse.lit_level", 0.3, "-", "brightest output above which it is light", low=0.0, high=1.0),
-    real("eclipse.lit_time", 5.0, "s", "light that ends an eclipse", low=0.0, high=1e4),
-)
-
 _SOURCES = {"sensors": 0, "model": 1, "both": 2}
 _MODEL = _SOURCES["model"]
 _SENSORS = _SOURCES["sensors"]
+
+SOURCE = choice("eclipse.source", "sensors", tuple(_SOURCES), "who decides on eclipse; both: the two must agree")
 
 
 class EclipseParameters(NamedTuple):
     """Levels relative to the normal Sun, times in seconds."""
 
-    source: int
-    dark_level: float
-    dark_time: float
-    lit_level: float
-    lit_time: float
+    source: int = made(_SOURCES.__getitem__, SOURCE)
+    dark_level: float = given(
+        real("eclipse.dark_level", 0.12, "-", "brightest output below which it is dark", low=0.0, high=1.0)
+    )
+    dark_time: float = given(real("eclipse.dark_time", 10.0, "s", "darkness that begins an eclipse", low=0.0, high=1e4))
+    lit_level: float = given(
+        real("eclipse.lit_level", 0.3, "-", "brightest output above which it is light", low=0.0, high=1.0)
+    )
+    lit_time: float = given(real("eclipse.lit_time", 5.0, "s", "light that ends an eclipse", low=0.0, high=1e4))
+
+
+PARAMETERS = table_of(EclipseParameters)
+parameters = builder(EclipseParameters)
 
 
 class EclipseState(NamedTuple):
@@ -48,12 +49,6 @@ class EclipseState(NamedTuple):
 
     sensed: int  # ECLIPSE_*
     contrary_time: float  # [s]
-
-
-def parameters(values: Values) -> EclipseParameters:
-    """Parameters from checked values."""
-    e = values.eclipse
-    return EclipseParameters(_SOURCES[e.source], e.dark_level, e.dark_time, e.lit_level, e.lit_time)
 
 
 def initial_state() -> EclipseState:

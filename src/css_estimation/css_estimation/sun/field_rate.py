@@ -6,34 +6,48 @@ but its own. Without Sun the field alone gives the two axes across itself. To bo
 fixed: along the orbit it turns by twice the orbital rate, 0.13 deg/s at most, and that much the rate is wrong.
 """
 
-import math
 from typing import NamedTuple
 
+from css_common.conversions import sine_of_degrees
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, flag, real
+from css_common.schema import flag, real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, subtract, unit
 from css_estimation.sun.low_pass import low_pass, low_pass_gain
 from css_estimation.sun.sun_heading import Aiding
 from css_estimation.sun.sun_rate import rate_from_sun_vectors
 
-PARAMETERS: Table = (
-    flag("rate.use_field", False, "without gyro, take from the magnetic field what the Sun vectors leave open"),
-    real("rate.field_cutoff", 0.1, "Hz", "corner of the low-pass on a field-derived rate", low=0.0, high=1e3),
-    real("rate.field_angle_deg", 15.0, "deg", "no rate about the Sun line from a field so near it", low=1.0, high=89.0),
-    real("rate.field_hold", 10.0, "s", "how long the last field and the rate from it are good", low=0.0, high=1e4),
-)
-
 _SMALLEST_FIELD = 1e-9  # [T]
 _LARGEST_FIELD = 1.0  # [T]
 
+USE_FIELD = flag("rate.use_field", False, "without gyro, take from the magnetic field what the Sun vectors leave open")
+
 
 class FieldRateParameters(NamedTuple):
-    """Built by `parameters`."""
+    """How the field is used."""
 
-    use_field: bool
-    cutoff: float  # [Hz]
-    smallest_sine: float  # of the angle from field to Sun line
-    hold: float  # [s]
+    use_field: bool = given(USE_FIELD)
+    cutoff: float = given(
+        real("rate.field_cutoff", 0.1, "Hz", "corner of the low-pass on a field-derived rate", low=0.0, high=1e3)
+    )
+    smallest_sine: float = made(  # of the angle from field to Sun line
+        sine_of_degrees,
+        real(
+            "rate.field_angle_deg",
+            15.0,
+            "deg",
+            "no rate about the Sun line from a field so near it",
+            low=1.0,
+            high=89.0,
+        ),
+    )
+    hold: float = given(
+        real("rate.field_hold", 10.0, "s", "how long the last field and the rate from it are good", low=0.0, high=1e4)
+    )
+
+
+PARAMETERS = table_of(FieldRateParameters)
+parameters = builder(FieldRateParameters)
 
 
 class FieldTrack(NamedTuple):
@@ -51,14 +65,6 @@ class FieldChange(NamedTuple):
     field_b: Vec3  # [T] the later
     previous_b: Vec3  # [T]
     interval: float  # [s]
-
-
-def parameters(values: Values) -> FieldRateParameters:
-    """Parameters from checked values."""
-    rate = values.rate
-    return FieldRateParameters(
-        rate.use_field, rate.field_cutoff, math.sin(math.radians(rate.field_angle_deg)), rate.field_hold
-    )
 
 
 def initial_state() -> FieldTrack:

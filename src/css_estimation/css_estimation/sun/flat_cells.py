@@ -6,29 +6,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import builder, computed, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values
-from css_estimation.sun import flat_faces, safe_hold, sun_tracking
+from css_common.schema import Values
+from css_estimation.sun import flat_faces, sun_tracking
 from css_estimation.sun.cell_layout import brightest
 from css_estimation.sun.eclipse_detector import detect_eclipse
-from css_estimation.sun.flat_faces import faces_of_cells, flat_heading
-from css_estimation.sun.safe_hold import MODE_FLAT, MODE_NO_SUN, CellsVerdict, finish_safe_hold
+from css_estimation.sun.flat_faces import FLAT_CELLS, faces_of_cells, flat_heading
+from css_estimation.sun.safe_hold import DEFAULTS, MODE_FLAT, MODE_NO_SUN, CellsVerdict, finish_safe_hold
 from css_estimation.sun.sun_heading import Aiding, SunHeading
 from css_estimation.sun.sun_tracking import TrackingParameters, TrackingState, elapsed
 
-PARAMETERS: Table = (*flat_faces.PARAMETERS, *safe_hold.PARAMETERS)
-
 
 class FlatParameters(NamedTuple):
-    """Built by `parameters`."""
+    """All of the estimator."""
 
-    faces: np.ndarray  # (N,) face of each cell
-    tracking: TrackingParameters
+    faces: np.ndarray = computed(faces_of_cells, FLAT_CELLS)  # (N,) face of each cell
+    tracking: TrackingParameters = part(TrackingParameters)
 
 
-def parameters(values: Values) -> FlatParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
-    return FlatParameters(faces_of_cells(values), sun_tracking.parameters(values))
+PARAMETERS = table_of(FlatParameters, **DEFAULTS)
+parameters = builder(FlatParameters)
 
 
 def conflicts(values: Values) -> Iterator[str]:
@@ -50,7 +48,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0

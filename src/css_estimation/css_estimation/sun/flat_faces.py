@@ -12,12 +12,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, integers
+from css_common.schema import Values, integers
 from css_common.vectors import Vec3, norm, scale
 from css_estimation.sun.cell_layout import READABLE
 
-PARAMETERS: Table = (
-    integers("flat.cells", (), "-", "numbers of the cells flat on the faces; empty: all with normals along body axes"),
+FLAT_CELLS = integers(
+    "flat.cells", (), "-", "numbers of the cells flat on the faces; empty: all with normals along body axes"
 )
 
 FACES = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -33,7 +33,7 @@ def faces_of_cells(values: Values) -> np.ndarray:
     """Number in `FACES` of the face that each cell (N,) belongs to; -1: none."""
     normals_b = np.asarray(values.cells.normals, dtype=np.float64)
     faces = np.full(len(normals_b), -1, dtype=np.int64)
-    chosen = [i for i in values.flat.cells if 0 <= i < len(normals_b)] or range(len(normals_b))
+    chosen = [i for i in values[FLAT_CELLS] if 0 <= i < len(normals_b)] or range(len(normals_b))
     for i in chosen:
         axis = int(np.argmax(np.abs(normals_b[i])))
         if abs(normals_b[i, axis]) >= _ALONG_AXIS_COS:
@@ -44,7 +44,7 @@ def faces_of_cells(values: Values) -> np.ndarray:
 def conflicts(values: Values) -> Iterator[str]:
     """Faces without cells and cells that lie on no face, one message each."""
     faces = faces_of_cells(values)
-    for i in values.flat.cells:
+    for i in values[FLAT_CELLS]:
         if not 0 <= i < len(faces):
             yield f"flat.cells: {i} given, expected numbers from 0 to {len(faces) - 1}"
         elif faces[i] < 0:

@@ -25,35 +25,19 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import builder, built, computed, given, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, flag, real
+from css_common.schema import Values, choice, flag, real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, subtract
-from css_estimation.sun import snapshot, sun_tracking
-from css_estimation.sun.cell_layout import brightest, missing_cells
-from css_estimation.sun.lit_cells import lit_cells
+from css_estimation.sun import sun_tracking
+from css_estimation.sun.cell_layout import brightest, cell_layout, missing_cells
+from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, Covariance, SunHeading
 from css_estimation.sun.sun_patterns import NO_PATTERNS, find_pattern, sun_patterns
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_filter import constrain
 from css_estimation.symmetric import Symmetric, add_outer, congruence, eigen, product, row_major, scaled
-
-PARAMETERS: Table = (
-    choice("weights", "output", ("output", "equal"), "weights of the cells: their outputs, or all the same"),
-    real("largest_condition", 10.0, "-", "condition number beyond which a direction is unknown", low=3.0, high=1e3),
-    real(
-        "cell_sigma",
-        0.1,
-        "-",
-        "cell error, all causes, 1 sigma",
-        low=0.0,
-        open_low=True,
-        high=10.0,
-        tunable=True,
-    ),
-    flag("use_dark_cells", False, "where cells do not span space, go by those that are dark"),
-    *snapshot.PARAMETERS,
-)
 
 MODE_LINE = 1
 MODE_PLANE = 2
@@ -70,14 +54,42 @@ _LARGEST_SIGMA = 1e6
 _LARGEST_VARIANCE = 4.0
 
 
-class LeastSquaresParameters(NamedTuple):
-    """Built by `parameters`."""
+_USE_DARK_CELLS = flag("use_dark_cells", False, "where cells do not span space, go by those that are dark")
 
-    snapshot: SnapshotParameters
-    weighted: bool
-    smallest_ratio: float  # of eigenvalues of sum w n n^T: one over the square of the condition number
-    cell_sigma: float
-    patterns: np.ndarray  # (P,) of sun_patterns.PATTERN; empty: dark cells are not used
+
+def _patterns(values: Values) -> np.ndarray:
+    return sun_patterns(cell_layout(values), built(Gate, values)) if values[_USE_DARK_CELLS] else NO_PATTERNS
+
+
+class LeastSquaresParameters(NamedTuple):
+    """All of the estimator."""
+
+    weighted: bool = made(
+        lambda word: word == "output",
+        choice("weights", "output", ("output", "equal"), "weights of the cells: their outputs, or all the same"),
+    )
+    smallest_ratio: float = made(  # of eigenvalues of sum w n n^T: one over the square of the condition number
+        lambda condition: condition**-2.0,
+        real("largest_condition", 10.0, "-", "condition number beyond which a direction is unknown", low=3.0, high=1e3),
+    )
+    cell_sigma: float = given(
+        real(
+            "cell_sigma",
+            0.1,
+            "-",
+            "cell error, all causes, 1 sigma",
+            low=0.0,
+            open_low=True,
+            high=10.0,
+            tunable=True,
+        )
+    )
+    patterns: np.ndarray = computed(_patterns, _USE_DARK_CELLS)  # (P,) of sun_patterns.PATTERN; empty: not used
+    snapshot: SnapshotParameters = part(SnapshotParameters)
+
+
+PARAMETERS = table_of(LeastSquaresParameters)
+parameters = builder(LeastSquaresParameters)
 
 
 class NormalEquations(NamedTuple):
@@ -86,18 +98,6 @@ class NormalEquations(NamedTuple):
     matrix: Symmetric  # M = sum w n n^T
     squared: Symmetric  # sum w^2 n n^T
     vector: Vec3  # b = sum w V n
-
-
-def parameters(values: Values) -> LeastSquaresParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
-    common = snapshot.parameters(values)
-    return LeastSquaresParameters(
-        snapshot=common,
-        weighted=values.weights == "output",
-        smallest_ratio=values.largest_condition**-2,
-        cell_sigma=values.cell_sigma,
-        patterns=sun_patterns(common.layout, common.gate) if values.use_dark_cells else NO_PATTERNS,
-    )
 
 
 def initial_state(p: LeastSquaresParameters) -> TrackingState:
@@ -206,7 +206,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     seen = least_squares(p, voltages, top)
     return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)

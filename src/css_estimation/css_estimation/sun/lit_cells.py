@@ -8,28 +8,25 @@ common to all cells without effect; an absolute gate does not.
 
 from typing import NamedTuple
 
+from css_common.declared import given, made
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, real
+from css_common.schema import choice, real
 from css_estimation.sun.cell_layout import READABLE
-
-PARAMETERS: Table = (
-    choice("gate_kind", "relative", ("relative", "absolute"), "gate as a share of the brightest cell, or as an output"),
-    real("gate", 0.45, "-", "a cell above the gate sees the Sun", low=0.0, high=1.0, tunable=True),
-    real("minimum_output", 0.1, "-", "no Sun unless a cell is above it", low=0.0, high=1.0, tunable=True),
-)
 
 
 class Gate(NamedTuple):
     """Which cells see the Sun."""
 
-    relative: bool
-    level: float
-    minimum_output: float
-
-
-def gate(values: Values) -> Gate:
-    """Gate from checked values (`PARAMETERS`)."""
-    return Gate(values.gate_kind == "relative", values.gate, values.minimum_output)
+    relative: bool = made(
+        lambda word: word == "relative",
+        choice(
+            "gate_kind", "relative", ("relative", "absolute"), "gate as a share of the brightest cell, or as an output"
+        ),
+    )
+    level: float = given(real("gate", 0.45, "-", "a cell above the gate sees the Sun", low=0.0, high=1.0, tunable=True))
+    minimum_output: float = given(
+        real("minimum_output", 0.1, "-", "no Sun unless a cell is above it", low=0.0, high=1.0, tunable=True)
+    )
 
 
 @kernel

@@ -15,20 +15,22 @@ flat cells.
 Modes are in `safe_hold`: `MODE_PYRAMID` while PFCSS is set; `MODE_PYRAMID_DENIED` while PFMIN holds but not PFCSS.
 """
 
-import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from css_common.conversions import cosine_of_degrees
+from css_common.declared import builder, computed, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, integers, real
+from css_common.schema import Values, integers, real
 from css_common.vectors import Vec3, add, dot, norm, scale, unit, vector_of
-from css_estimation.sun import flat_faces, safe_hold, sun_tracking
+from css_estimation.sun import flat_faces, sun_tracking
 from css_estimation.sun.cell_layout import READABLE, brightest
 from css_estimation.sun.eclipse_detector import detect_eclipse
-from css_estimation.sun.flat_faces import faces_of_cells, flat_heading
+from css_estimation.sun.flat_faces import FLAT_CELLS, faces_of_cells, flat_heading
 from css_estimation.sun.safe_hold import (
+    DEFAULTS,
     MODE_FLAT,
     MODE_NO_SUN,
     MODE_PYRAMID,
@@ -39,20 +41,9 @@ from css_estimation.sun.safe_hold import (
 from css_estimation.sun.sun_heading import ECLIPSE_SUNLIT, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import TrackingParameters, TrackingState, elapsed
 
-PARAMETERS: Table = (
-    integers("pyramid.cells", (), "-", "numbers of its three cells; empty: those with normals along no body axis"),
-    real("pyramid.minimum", 0.15, "-", "least output of each of its cells (PFMIN)", low=0.0, high=1.0, tunable=True),
-    real(
-        "pyramid.entry_deg",
-        25.0,
-        "deg",
-        "it is taken while the flat cells have the Sun within this angle of the array normal",
-        low=0.0,
-        high=180.0,
-        tunable=True,
-    ),
-    *flat_faces.PARAMETERS,
-    *safe_hold.PARAMETERS,
+_CELLS = integers("pyramid.cells", (), "-", "numbers of its three cells; empty: those with normals along no body axis")
+_MINIMUM = real(
+    "pyramid.minimum", 0.15, "-", "least output of each of its cells (PFMIN)", low=0.0, high=1.0, tunable=True
 )
 
 # Cosine between two normals that still count as orthogonal: outputs and components then differ by 0.1 %.
@@ -67,14 +58,49 @@ class Pyramid(NamedTuple):
     minimum: float
 
 
-class PyramidParameters(NamedTuple):
-    """Built by `parameters`."""
+def _pyramid_cells(values: Values) -> list[int]:
+    if len(values[_CELLS]):
+        return [int(i) for i in values[_CELLS]]
+    return np.flatnonzero(faces_of_cells(values) < 0).tolist()
 
-    faces: np.ndarray  # (N,) face of each flat cell
-    pyramid: Pyramid
-    array_normal_b: Vec3
-    entry_cos: float
-    tracking: TrackingParameters
+
+def _pyramid(values: Values) -> Pyramid:
+    """The pyramid; without three cells that can be one, which `conflicts` reports, there is none."""
+    cells = _pyramid_cells(values)
+    if len(cells) != 3 or not all(0 <= i < len(values.cells.normals) for i in cells):
+        zero = (0.0, 0.0, 0.0)
+        return Pyramid((-1, -1, -1), (zero, zero, zero), values[_MINIMUM])
+    a, b, c = (vector_of(values.cells.normals[i]) for i in cells)
+    return Pyramid((cells[0], cells[1], cells[2]), (a, b, c), values[_MINIMUM])
+
+
+def _array_normal(values: Values) -> Vec3:
+    return vector_of(values.spacecraft.array_normal)
+
+
+class PyramidParameters(NamedTuple):
+    """All of the estimator."""
+
+    pyramid: Pyramid = computed(_pyramid, _CELLS, _MINIMUM)
+    entry_cos: float = made(
+        cosine_of_degrees,
+        real(
+            "pyramid.entry_deg",
+            25.0,
+            "deg",
+            "it is taken while the flat cells have the Sun within this angle of the array normal",
+            low=0.0,
+            high=180.0,
+            tunable=True,
+        ),
+    )
+    faces: np.ndarray = computed(faces_of_cells, FLAT_CELLS)  # (N,) face of each flat cell
+    array_normal_b: Vec3 = computed(_array_normal)
+    tracking: TrackingParameters = part(TrackingParameters)
+
+
+PARAMETERS = table_of(PyramidParameters, **DEFAULTS)
+parameters = builder(PyramidParameters)
 
 
 class PyramidState(NamedTuple):
@@ -82,29 +108,6 @@ class PyramidState(NamedTuple):
 
     adopted: bool  # PFCSS
     tracking: TrackingState
-
-
-def _pyramid_cells(values: Values) -> list[int]:
-    if len(values.pyramid.cells):
-        return [int(i) for i in values.pyramid.cells]
-    return np.flatnonzero(faces_of_cells(values) < 0).tolist()
-
-
-def parameters(values: Values) -> PyramidParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `cells` and `spacecraft`).
-
-    Without three cells that can be a pyramid, which `conflicts` reports, there is none.
-    """
-    cells = _pyramid_cells(values)
-    if len(cells) != 3 or not all(0 <= i < len(values.cells.normals) for i in cells):
-        zero = (0.0, 0.0, 0.0)
-        pyramid = Pyramid((-1, -1, -1), (zero, zero, zero), values.pyramid.minimum)
-    else:
-        a, b, c = (vector_of(values.cells.normals[i]) for i in cells)
-        pyramid = Pyramid((cells[0], cells[1], cells[2]), (a, b, c), values.pyramid.minimum)
-    x, y, z = (float(c) for c in values.spacecraft.array_normal)
-    entry_cos = math.cos(math.radians(values.pyramid.entry_deg))
-    return PyramidParameters(faces_of_cells(values), pyramid, (x, y, z), entry_cos, sun_tracking.parameters(values))
 
 
 def conflicts(values: Values) -> Iterator[str]:
@@ -174,7 +177,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[PyramidState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0

@@ -6,13 +6,10 @@ control that minds validity ignores the attitude. Who decides on the shadow is `
 flight's own orbit model. Sunlit without a lit cell, the last heading is held.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 from css_common.kernel import kernel
-from css_common.schema import Table
 from css_common.vectors import Vec3
-from css_estimation.sun import sun_tracking
 from css_estimation.sun.eclipse_detector import EclipseState
 from css_estimation.sun.sun_heading import (
     ECLIPSE_SUNLIT,
@@ -24,10 +21,8 @@ from css_estimation.sun.sun_heading import (
 )
 from css_estimation.sun.sun_tracking import Estimate, TrackingParameters, TrackingState, finish_cycle, gyro_usable
 
-PARAMETERS: Table = tuple(
-    replace(parameter, default="model") if parameter.name == "eclipse.source" else parameter
-    for parameter in sun_tracking.PARAMETERS
-)
+DEFAULTS = {"eclipse__source": "model"}
+"""What is the default in a safe hold and not elsewhere."""
 
 MODE_NO_SUN = 0
 MODE_FLAT = 1

@@ -3,10 +3,10 @@
 
 from typing import NamedTuple
 
+from css_common.declared import computed, given, part
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, flag
+from css_common.schema import flag
 from css_common.vectors import Vec3
-from css_estimation.sun import lit_cells, sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, cell_layout
 from css_estimation.sun.eclipse_detector import detect_eclipse
 from css_estimation.sun.lit_cells import Gate
@@ -21,22 +21,16 @@ from css_estimation.sun.sun_tracking import (
     turned_sun,
 )
 
-PARAMETERS: Table = (
-    *lit_cells.PARAMETERS,
-    flag("propagate_held", True, "without Sun, turn the held vector with the gyro"),
-    *sun_tracking.PARAMETERS,
-)
-
 MODE_NO_SUN = 0
 
 
 class SnapshotParameters(NamedTuple):
-    """Built by `parameters`."""
+    """Part of the parameters of such an estimator."""
 
-    layout: CellLayout
-    gate: Gate
-    propagate_held: bool
-    tracking: TrackingParameters
+    layout: CellLayout = computed(cell_layout)
+    gate: Gate = part(Gate)
+    propagate_held: bool = given(flag("propagate_held", True, "without Sun, turn the held vector with the gyro"))
+    tracking: TrackingParameters = part(TrackingParameters)
 
 
 class Snapshot(NamedTuple):
@@ -46,16 +40,6 @@ class Snapshot(NamedTuple):
     covariance: Covariance
     lit_mask: int
     mode: int  # MODE_NO_SUN, or another number that is the estimator's own
-
-
-def parameters(values: Values) -> SnapshotParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
-    return SnapshotParameters(
-        layout=cell_layout(values),
-        gate=lit_cells.gate(values),
-        propagate_held=values.propagate_held,
-        tracking=sun_tracking.parameters(values),
-    )
 
 
 @kernel

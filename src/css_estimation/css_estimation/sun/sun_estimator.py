@@ -2,7 +2,6 @@
 """A Sun estimator as a component of the graph; a node file only names the algorithm."""
 
 from collections.abc import Mapping
-from types import ModuleType
 from typing import ClassVar
 
 from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
@@ -10,10 +9,14 @@ from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields
+from css_estimation.sun.eclipse_detector import SOURCE
 from css_estimation.sun.eclipse_prediction import EclipsePrediction
+from css_estimation.sun.field_rate import USE_FIELD
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
+from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN, Aiding
+from css_estimation.sun.sun_tracking import RATE_CUTOFF
 from css_msgs.msg import SunEstimate
 
 
@@ -21,12 +24,12 @@ class SunEstimator(Component):
     """Cell outputs and, while they deliver, gyro and magnetometer in; `<node name>/sun_estimate` out.
 
     Class attributes:
-        algorithm: module of the shape that `css_estimation.sun.sun_heading` describes.
+        algorithm: module of this shape.
         mode_names: names of its modes, if changes between them are worth a line in the log.
     """
 
     shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "magnetometer")
-    algorithm: ClassVar[ModuleType]
+    algorithm: ClassVar[SunAlgorithm]
     mode_names: ClassVar[Mapping[int, str]] = {}
 
     @classmethod
@@ -35,7 +38,7 @@ class SunEstimator(Component):
             cells_input(values),
             gyro_input(values),
         ]
-        if values.rate.use_field:
+        if values[USE_FIELD]:
             inputs.append(field_input(values))
         return tuple(inputs)
 
@@ -48,7 +51,7 @@ class SunEstimator(Component):
         # in plain Python: loading the compiled one takes a second that a check before the flight need not wait for
         heading_gain = getattr(cls.algorithm, "heading_gain", None)
         return Smoothing(
-            rate=low_pass_gain.py_func(values.rate.cutoff, values.mission.period),
+            rate=low_pass_gain.py_func(values[RATE_CUTOFF], values.mission.period),
             heading=1.0 if heading_gain is None else heading_gain(values),
         )
 
@@ -58,7 +61,7 @@ class SunEstimator(Component):
         self._step = typed_call(self.algorithm.step)
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
-        sensors_decide = self.values.eclipse.source == "sensors"
+        sensors_decide = self.values[SOURCE] == "sensors"
         self._prediction = None if sensors_decide else EclipsePrediction(self.values)
 
     def tune(self, values: Values) -> None:

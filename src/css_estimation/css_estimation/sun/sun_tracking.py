@@ -17,8 +17,9 @@ import math
 from typing import NamedTuple
 
 from css_common.attitude import rotation_vector_to_dcm
+from css_common.declared import builder, given, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, flag, real
+from css_common.schema import choice, flag, real
 from css_common.vectors import Vec3, multiply, scale, unit
 from css_estimation.sun import eclipse_detector, field_rate
 from css_estimation.sun.eclipse_detector import EclipseParameters, EclipseState
@@ -44,29 +45,36 @@ from css_estimation.sun.sun_heading import (
 )
 from css_estimation.sun.sun_rate import rate_from_sun_vectors
 
-PARAMETERS: Table = (
-    flag("use_gyro", True, "use the gyro while it delivers; off: rates from Sun vectors", tunable=True),
-    real("rate.cutoff", 0.1, "Hz", "corner of the first-order low-pass on the rate", low=0.0, high=1e3),
-    real("rate.limit_deg_s", 10.0, "deg/s", "bound on each axis of a Sun-derived rate", low=0.0, high=360.0),
-    real("rate.gyro_limit_deg_s", 300.0, "deg/s", "a gyro reading beyond it is not used", low=0.0, high=1e4),
-    choice("rate.without_information", "hold", ("hold", "zero"), "filtered rate while none is measured"),
-    *field_rate.PARAMETERS,
-    *eclipse_detector.PARAMETERS,
-)
-
 _LONGEST_STEP = 1e9  # [s]
+
+RATE_CUTOFF = real("rate.cutoff", 0.1, "Hz", "corner of the first-order low-pass on the rate", low=0.0, high=1e3)
 
 
 class TrackingParameters(NamedTuple):
     """Rates in rad/s."""
 
-    use_gyro: bool
-    cutoff: float  # [Hz]
-    rate_limit: float
-    gyro_limit: float
-    hold_rate: bool
-    field: FieldRateParameters
-    eclipse: EclipseParameters
+    use_gyro: bool = given(
+        flag("use_gyro", True, "use the gyro while it delivers; off: rates from Sun vectors", tunable=True)
+    )
+    cutoff: float = given(RATE_CUTOFF)
+    rate_limit: float = made(
+        math.radians,
+        real("rate.limit_deg_s", 10.0, "deg/s", "bound on each axis of a Sun-derived rate", low=0.0, high=360.0),
+    )
+    gyro_limit: float = made(
+        math.radians,
+        real("rate.gyro_limit_deg_s", 300.0, "deg/s", "a gyro reading beyond it is not used", low=0.0, high=1e4),
+    )
+    hold_rate: bool = made(
+        lambda word: word == "hold",
+        choice("rate.without_information", "hold", ("hold", "zero"), "filtered rate while none is measured"),
+    )
+    field: FieldRateParameters = part(FieldRateParameters)
+    eclipse: EclipseParameters = part(EclipseParameters)
+
+
+PARAMETERS = table_of(TrackingParameters)
+parameters = builder(TrackingParameters)
 
 
 class TrackingState(NamedTuple):
@@ -93,20 +101,6 @@ class Estimate(NamedTuple):
     nis_dof: int
     lit_mask: int
     mode: int
-
-
-def parameters(values: Values) -> TrackingParameters:
-    """Parameters from checked values."""
-    rate = values.rate
-    return TrackingParameters(
-        use_gyro=values.use_gyro,
-        cutoff=rate.cutoff,
-        rate_limit=math.radians(rate.limit_deg_s),
-        gyro_limit=math.radians(rate.gyro_limit_deg_s),
-        hold_rate=rate.without_information == "hold",
-        field=field_rate.parameters(values),
-        eclipse=eclipse_detector.parameters(values),
-    )
 
 
 def initial_state() -> TrackingState:

@@ -26,8 +26,10 @@ measured rate, 4 propagating without one.
 import math
 from typing import NamedTuple
 
+from css_common.conversions import square
+from css_common.declared import builder, computed, given, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, real
+from css_common.schema import Values, choice, real
 from css_common.vectors import Vec3
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import READABLE, CellLayout, brightest, cell_layout, is_opposed, missing_cells, sees
@@ -47,56 +49,6 @@ from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.sun.wavg import weighted_average
 from css_estimation.symmetric import Symmetric, isotropic, row_major, trace
 
-PARAMETERS: Table = (
-    real(
-        "gate",
-        0.4,
-        "-",
-        "share of the brightest cell above which a cell is used",
-        low=0.0,
-        high=1.0,
-        tunable=True,
-    ),
-    real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True),
-    real(
-        "cell_sigma",
-        0.1,
-        "-",
-        "cell error, all causes, 1 sigma",
-        low=0.0,
-        open_low=True,
-        high=10.0,
-        tunable=True,
-    ),
-    real(
-        "process_sigma",
-        0.01,
-        "rad/sqrt(s)",
-        "drift of the Sun line, 1 sigma",
-        low=0.0,
-        high=10.0,
-        tunable=True,
-    ),
-    real(
-        "process_sigma_without_rate",
-        0.1,
-        "rad/sqrt(s)",
-        "the same while no rate is measured, 1 sigma",
-        low=0.0,
-        high=10.0,
-        tunable=True,
-    ),
-    real("initial_sigma", 1.0, "rad", "error of the start, 1 sigma", low=0.0, open_low=True, high=2.0),
-    real("largest_variance", 4.0, "rad^2", "cap on the diagonal of the covariance", low=0.01, high=100.0),
-    choice(
-        "propagate_with",
-        "measured",
-        ("measured", "filtered"),
-        "gyro rate as measured, or as low-pass filtered",
-    ),
-    *sun_tracking.PARAMETERS,
-)
-
 MODE_WAITING = 0
 MODE_STARTED = 1
 MODE_TRACKING = 2
@@ -107,18 +59,62 @@ MODE_COASTING = 4
 _LARGEST_READING = 2.0
 
 
-class EkfParameters(NamedTuple):
-    """Built by `parameters`; variances in rad^2, process noise in rad^2/s."""
+_CELL_SIGMA = real(
+    "cell_sigma", 0.1, "-", "cell error, all causes, 1 sigma", low=0.0, open_low=True, high=10.0, tunable=True
+)
+_PROCESS_SIGMA = real(
+    "process_sigma", 0.01, "rad/sqrt(s)", "drift of the Sun line, 1 sigma", low=0.0, high=10.0, tunable=True
+)
 
-    layout: CellLayout
-    gate: Gate
-    cell_variance: float
-    process_noise: float
-    process_noise_without_rate: float
-    initial_variance: float
-    largest_variance: float
-    propagate_filtered: bool
-    tracking: TrackingParameters
+
+class EkfParameters(NamedTuple):
+    """Variances in rad^2, process noise in rad^2/s."""
+
+    layout: CellLayout = computed(cell_layout)
+    gate: Gate = made(
+        lambda level, minimum: Gate(True, level, minimum),
+        real(
+            "gate",
+            0.4,
+            "-",
+            "share of the brightest cell above which a cell is used",
+            low=0.0,
+            high=1.0,
+            tunable=True,
+        ),
+        real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True),
+    )
+    cell_variance: float = made(square, _CELL_SIGMA)
+    process_noise: float = made(square, _PROCESS_SIGMA)
+    process_noise_without_rate: float = made(
+        square,
+        real(
+            "process_sigma_without_rate",
+            0.1,
+            "rad/sqrt(s)",
+            "the same while no rate is measured, 1 sigma",
+            low=0.0,
+            high=10.0,
+            tunable=True,
+        ),
+    )
+    initial_variance: float = made(
+        square, real("initial_sigma", 1.0, "rad", "error of the start, 1 sigma", low=0.0, open_low=True, high=2.0)
+    )
+    largest_variance: float = given(
+        real("largest_variance", 4.0, "rad^2", "cap on the diagonal of the covariance", low=0.01, high=100.0)
+    )
+    propagate_filtered: bool = made(
+        lambda word: word == "filtered",
+        choice(
+            "propagate_with", "measured", ("measured", "filtered"), "gyro rate as measured, or as low-pass filtered"
+        ),
+    )
+    tracking: TrackingParameters = part(TrackingParameters)
+
+
+PARAMETERS = table_of(EkfParameters)
+parameters = builder(EkfParameters)
 
 
 class EkfState(NamedTuple):
@@ -129,27 +125,12 @@ class EkfState(NamedTuple):
     tracking: TrackingState
 
 
-def parameters(values: Values) -> EkfParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
-    return EkfParameters(
-        layout=cell_layout(values),
-        gate=Gate(True, values.gate, values.minimum_output),
-        cell_variance=values.cell_sigma**2,
-        process_noise=values.process_sigma**2,
-        process_noise_without_rate=values.process_sigma_without_rate**2,
-        initial_variance=values.initial_sigma**2,
-        largest_variance=values.largest_variance,
-        propagate_filtered=values.propagate_with == "filtered",
-        tracking=sun_tracking.parameters(values),
-    )
-
-
 def heading_gain(values: Values) -> float:
     """Steady gain of the filter across the Sun line at one cell's worth of information in a cycle.
 
     P = P - P^2 / (P + R) + Q h, solved for the covariance P before an update.
     """
-    q, r = values.process_sigma**2 * values.mission.period, values.cell_sigma**2
+    q, r = values[_PROCESS_SIGMA] ** 2 * values.mission.period, values[_CELL_SIGMA] ** 2
     before = 0.5 * (q + math.sqrt(q * q + 4.0 * q * r))
     return before / (before + r)
 
@@ -160,7 +141,9 @@ def initial_state(p: EkfParameters) -> EkfState:
 
 
 @kernel
-def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float):
+def update_cells(
+    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float
+) -> tuple[Vec3, Symmetric, float, int, int]:
     """Updates with every cell that the propagated `sun_b` or the gate selects.
 
     Returns:
@@ -197,7 +180,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[EkfState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, aiding)
     top = brightest(voltages)

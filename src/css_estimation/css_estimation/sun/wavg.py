@@ -10,17 +10,15 @@ brightest cell below an absolute gate.
 
 from typing import NamedTuple
 
+from css_common.declared import builder, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values
 from css_common.vectors import Vec3, norm, scale
-from css_estimation.sun import snapshot, sun_tracking
+from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest
 from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
-
-PARAMETERS: Table = snapshot.PARAMETERS
 
 MODE_AVERAGE = 1
 MODE_SINGLE_CELL = 2
@@ -31,14 +29,13 @@ _NO_DIRECTION = 1e-6
 
 
 class WavgParameters(NamedTuple):
-    """Built by `parameters`."""
+    """All of the estimator."""
 
-    snapshot: SnapshotParameters
+    snapshot: SnapshotParameters = part(SnapshotParameters)
 
 
-def parameters(values: Values) -> WavgParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `cells`)."""
-    return WavgParameters(snapshot.parameters(values))
+PARAMETERS = table_of(WavgParameters)
+parameters = builder(WavgParameters)
 
 
 def initial_state(p: WavgParameters) -> TrackingState:
@@ -82,7 +79,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
     seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)

@@ -18,9 +18,10 @@ from pathlib import Path
 
 from rich.console import Console
 
+from css_analysis.quantities import Summary
 from css_analysis.readable_table import ReadableTable
 from css_common import places
-from css_common.command import CommandParser, command_parser, guarded
+from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
 from css_monte_carlo.mission_parts import measured_estimators
@@ -28,7 +29,7 @@ from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
 from css_monte_carlo.study_folder import StudyError
-from css_monte_carlo.study_summary import study_object
+from css_monte_carlo.study_summary import study_object, summaries_of
 
 _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
@@ -44,7 +45,12 @@ percentiles.parquet (percentiles over the cases against time), beside study.json
 def _parser() -> CommandParser:
     parser = command_parser("css_monte_carlo", "monte_carlo", __doc__, _EXAMPLES, notes=_NOTES)
     add = parser.add_argument
-    add("mission", nargs="?", default="okeefe_2013", help="name in config/ or a file (default: %(default)s)")
+    add(
+        "mission",
+        nargs="?",
+        default="okeefe_2013",
+        help=MISSION_HELP,
+    )
     add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
     add("--first-case", type=int, default=0, metavar="K", help="number of the first case (default: 0)")
     add(
@@ -165,36 +171,11 @@ def _default_folder(mission: str) -> Path:
     return places.results("studies") / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
 
 
-_COLUMNS = (
-    ("heading_error_mean_deg", "heading\nerror\nmean\n[deg]", "{:.2f}"),
-    ("heading_error_p95_deg", "heading\nerror\n95 %\n[deg]", "{:.2f}"),
-    ("power_positive_fraction", "power\nposi-\ntive\n", "{:.1%}"),
-    ("converging_mean_s", "con-\nverging\nmean\n[s]", "{:.1f}"),
-    ("converging_max_s", "con-\nverging\nmax\n[s]", "{:.1f}"),
-    ("rate_50min_deg_s", "rate at\n50 min\n\n[deg/s]", "{:.3f}"),
-    ("rate_knowledge_50min_deg_s", "its\nerror\n\n[deg/s]", "{:.3f}"),
-)
-
-
-_ATTITUDE_COLUMNS = (
-    ("first_attitude_s", "first\natti-\ntude\n[s]", "{:.1f}"),
-    ("attitude_error_mean_deg", "attitude\nerror\nmean\n[deg]", "{:.3f}"),
-    ("attitude_error_p95_deg", "attitude\nerror\n95 %\n[deg]", "{:.3f}"),
-    ("attitude_error_max_deg", "attitude\nerror\nmax\n[deg]", "{:.2f}"),
-    ("gyro_bias_error_mean_deg_s", "gyro\nbias\nerror\n[deg/s]", "{:.4f}"),
-    ("attitude_nees", "NEES\n(3)\n\n", "{:.2f}"),
-    ("attitude_bias_nees", "NEES\n(6)\n\n", "{:.2f}"),
-    ("attitude_nis", "NIS\n(1)\n\n", "{:.3f}"),
-    ("steps_without_estimate", "steps\nwithout\nesti-\nmate", "{:.1f}"),
-)
-
-
 def print_study(study: Study, result: dict, console: Console) -> None:
     """A table of the configurations of each kind, the values of a sweep below each other, and where the files are."""
-    for columns in (_COLUMNS, _ATTITUDE_COLUMNS):
-        rows = [row for row in result["configurations"] if columns[1][0] in row]
-        if rows:
-            console.print(_study_table(rows, columns))
+    rows = result["configurations"]
+    for columns in dict.fromkeys(summaries_of(study, row["estimator"]) for row in rows):
+        console.print(_study_table([row for row in rows if summaries_of(study, row["estimator"]) == columns], columns))
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
@@ -205,18 +186,18 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     console.print(f"study: {study.folder}", soft_wrap=True)
 
 
-def _study_table(rows: Sequence[dict], columns: Sequence[tuple[str, str, str]]) -> ReadableTable:
+def _study_table(rows: Sequence[dict], columns: Sequence[Summary]) -> ReadableTable:
     table = ReadableTable()
     table.add_name("estimator")
     table.add_number("gyro")
     for key in _swept(rows[0]):
         table.add_number(re.sub(r"(?<=[._])", "\n", key))
-    for _, heading, _ in columns:
-        table.add_number(heading)
+    for column in columns:
+        table.add_number(column.title)
     # configurations go point by point; what one estimator makes of a sweep is read down a column
     kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
     for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
-        figures = ["-" if row[key] is None else form.format(row[key]) for key, _, form in columns]
+        figures = ["-" if row[c.name] is None else c.form.format(row[c.name]) for c in columns]
         table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
     return table
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_analysis.flight_metrics import SETTLED_AFTER
+from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission
 from css_monte_carlo.attitude_tallies import SAMPLED, AttitudeTallies
 from css_monte_carlo.chunk import fly_in_threads
@@ -35,7 +35,7 @@ ERROR, SIGMA, _, LIT = range(len(SAMPLED))
 
 
 class Merit(NamedTuple):
-    """One filter with one set of diodes, all cases, from 300 s on; angles in deg."""
+    """One filter with one set of diodes, all cases, once settled; angles in deg."""
 
     mean: float
     p95: float
@@ -71,17 +71,17 @@ def fly(
     flights = [MissionFlight(flown, name) for name in FILTERS]
     tallies = dict(zip(FILTERS, fly_in_threads(flights, cases, guess_deg=GUESS_DEG, progress=progress), strict=True))
     return Flown(
-        {name: _merit(of_filter, period_s) for name, of_filter in tallies.items()},
+        {name: _merit(of_filter, period_s, windows_of(mission).settled_time) for name, of_filter in tallies.items()},
         {name: of_filter.samples for name, of_filter in tallies.items()},
         period_s,
     )
 
 
-def _merit(tallies: AttitudeTallies, period_s: float) -> Merit:
+def _merit(tallies: AttitudeTallies, period_s: float, settled_s: float) -> Merit:
     totals = tallies.totals
     settled = int(totals["settled"].sum())
     errors = tallies.samples[:, ERROR]
-    late = errors[:, int(SETTLED_AFTER / period_s) :]
+    late = errors[:, int(settled_s / period_s) :]
     last = errors[:, -int(60.0 / period_s) :].mean(axis=1)
     return Merit(
         mean=float(totals["error_sum"].sum() / settled),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from css_analysis.flight_log import SUNLIT_FRACTION
+from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission
 from css_environment.mission_environment import MissionEnvironment
 from css_papers.okeefe.flight_figures import (
@@ -41,7 +42,7 @@ def flight_part(
     mission: Mission, printed: Variant, improved: Variant, notes: Mapping[tuple[str, str], str], folder: Path
 ) -> Part:
     """Figs. 6 to 8."""
-    shadow = shadow_of(mission)
+    shadow, windows = shadow_of(mission), windows_of(mission)
     variants = (printed, improved)
     plots = [
         Picture(write_against_time(quantity, variants, shadow, folder / f"{name}.png").name, caption)
@@ -66,9 +67,9 @@ def flight_part(
     )
     rows = [
         *orbit_rows(mission.values.mission.duration, shadow),
-        *flight_rows(printed, shadow, notes),
-        *flight_rows(improved, shadow),
-        *attitude_rows(printed, shadow),
+        *flight_rows(printed, shadow, windows, notes),
+        *flight_rows(improved, shadow, windows),
+        *attitude_rows(printed, shadow, windows),
     ]
     return Part([Section("Flights", plots), Section("Converging", [converging_table(variants)])], rows)
 

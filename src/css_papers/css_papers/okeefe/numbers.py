@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from css_analysis.flight_metrics import Windows
 from css_monte_carlo.study import Configuration
 from css_papers.cell_outputs import OrbitOutputs
 from css_papers.okeefe.flight_figures import POINTING_ERROR, RATE_KNOWLEDGE, Shadow, Variant
@@ -18,12 +19,9 @@ from css_papers.okeefe.flights import merit
 from css_papers.rows import Must, Row, number, row
 from css_papers.study_columns import column, curve
 
-_LATE_S = 300.0  # sunlit time at the end of a flight over which errors are averaged, as in a study's cases
-
 # mean norm of the gyro's white noise, 0.01 deg/s on each of three axes
 _NOISE_DEG_S = 0.01 * math.sqrt(8.0 / math.pi)
 _DEADBAND_DEG = 15.0
-_REPORT_TIME_S = 3000.0
 _DUSK_S = 30.0
 
 HEADING, RATE, KNOWLEDGE, CONVERGING, CONVERGED = "heading", "rate", "knowledge", "converging", "converged"
@@ -112,11 +110,14 @@ def albedo_rows(low: Peaks, polar: Peaks) -> list[Row]:
     return [line("45", 25.0, low, Must(20.0, 30.0)), line("90", 50.0, polar, Must(35.0, 60.0))]
 
 
-def flight_rows(variant: Variant, shadow: Shadow, notes: Mapping[tuple[str, str], str] | None = None) -> list[Row]:
+def flight_rows(
+    variant: Variant, shadow: Shadow, windows: Windows, notes: Mapping[tuple[str, str], str] | None = None
+) -> list[Row]:
     """The flights of a variant, which keeps to the paper's bounds as printed, and else must be better than the paper.
 
     Args:
         shadow: where the orbit of the flights is dark.
+        windows: when the mission of the flights is measured.
         notes: label of a configuration and kind of quantity to why it differs from the paper.
     """
     rows = []
@@ -148,7 +149,7 @@ def flight_rows(variant: Variant, shadow: Shadow, notes: Mapping[tuple[str, str]
             line(KNOWLEDGE, "rate error at 50 min", "deg/s", paper.knowledge_deg_s,
                  here.rate_knowledge_50min_deg_s,
                  Must(None, paper.knowledge_deg_s or _NOISE_DEG_S), "" if paper.knowledge_deg_s else "noise",
-                 _before_the_dark(variant, configuration, shadow)),
+                 _before_the_dark(variant, configuration, shadow, windows.report_time)),
             line(CONVERGING, "longest converging", "min", paper.converging_min, here.converging_max_min,
                  Must(None, paper.converging_min), paper.relation, _slow_cases(variant, configuration, paper)),
             line(CONVERGED, "cases converged", "%", 100.0, here.converged_percent, Must(100.0)),
@@ -162,29 +163,30 @@ def _slow_cases(variant: Variant, configuration: Configuration, paper: _Printed)
     return f"{slow} of {len(minutes)} cases take longer than the paper's longest" if slow else ""
 
 
-def _before_the_dark(variant: Variant, configuration: Configuration, shadow: Shadow) -> str:
-    """What the rate error was in the last sunlit minute before 50 min, if it is dark then and no gyro measures."""
-    if configuration.gyro or not shadow.at(np.array([_REPORT_TIME_S]))[0]:
+def _before_the_dark(variant: Variant, configuration: Configuration, shadow: Shadow, time_s: float) -> str:
+    """What the rate error was in the last sunlit minute before a time [s], if it is dark then and no gyro measures."""
+    if configuration.gyro or not shadow.at(np.array([time_s]))[0]:
         return ""
     line = curve(variant.percentiles, configuration, RATE_KNOWLEDGE.name)
-    lit = np.flatnonzero((line.time_s <= _REPORT_TIME_S) & ~shadow.at(line.time_s))
+    lit = np.flatnonzero((line.time_s <= time_s) & ~shadow.at(line.time_s))
     if not len(lit):
         return ""
     # the last seconds of sunlight are dim, and no time to read a rate from
     end_s = line.time_s[lit[-1]] - _DUSK_S
     minute = (line.time_s > end_s - 60.0) & (line.time_s <= end_s)
     return (
-        f"at 50 min it is dark here and nothing measures a rate, the estimator holds or forgets its last one; in a "
-        f"minute of sunlight before, at {end_s / 60.0:.0f} min, it errs by {number(float(line.mean[minute].mean()))}"
+        f"at {time_s / 60.0:g} min it is dark here and nothing measures a rate, the estimator holds or forgets its "
+        f"last one; in a minute of sunlight before, at {end_s / 60.0:.0f} min, "
+        f"it errs by {number(float(line.mean[minute].mean()))}"
     )
 
 
-def attitude_rows(variant: Variant, shadow: Shadow) -> list[Row]:
+def attitude_rows(variant: Variant, shadow: Shadow, windows: Windows) -> list[Row]:
     """Attitude errors that the text reads from Fig. 2: the average settles where its own error meets the deadband."""
     entry = next(entry for entry in variant.entries if entry.label == "average, gyro")
     line = curve(variant.percentiles, entry.configuration, POINTING_ERROR.name)
     late = np.flatnonzero(~shadow.at(line.time_s) & np.isfinite(line.mean))
-    late = late[line.time_s[late] > line.time_s[late[-1]] - _LATE_S] if len(late) else late
+    late = late[line.time_s[late] > line.time_s[late[-1]] - windows.late_time] if len(late) else late
     mean, p95 = (float(values[late].mean()) if len(late) else None for values in (line.mean, line.p95))
     return [
         row("average, gyro: pointing error, mean", "deg", 10.0, mean, Must(None, _DEADBAND_DEG)),

@@ -7,12 +7,13 @@ import re
 import pytest
 from rich.console import Console
 
-from css_analysis.flight_metrics import QUANTITIES
+from css_analysis.flight_metrics import Windows
 from css_analysis.flight_summary import criteria_failures, criteria_verdicts, summary_table
+from css_analysis.quantities import QUANTITIES, summaries
 from css_analysis.readable_table import ReadableTable
 from css_common.mission import load_mission
-from css_monte_carlo.commands.coverage import _print_tables, study
 from css_monte_carlo.commands.monte_carlo import _study_table
+from css_monte_carlo.verbs.coverage import _print_tables, study
 
 WIDTHS = (12, 20, 40, 60, 80, 120)
 
@@ -108,12 +109,13 @@ def configuration(estimator, gyro, scale, first):
     return {"estimator": estimator, "gyro": gyro, "overrides": overrides, **figures}
 
 
+COLUMNS = summaries(Windows(report_time=3000.0))
 ORDER = [(0, "wavg"), (0, "ekf"), (0.1, "wavg"), (0.1, "ekf"), (0.25, "wavg"), (0.25, "ekf")]
 SWEEP = [configuration(name, "on", scale, 1000.0 * i) for i, (scale, name) in enumerate(ORDER)]
 
 
 def test_a_sweep_is_one_table_with_the_values_below_each_other():
-    lines = printed(_study_table(SWEEP), 120).splitlines()
+    lines = printed(_study_table(SWEEP, COLUMNS), 120).splitlines()
     rows = [line.split()[:5] for line in lines if line.split()[:1] in (["wavg"], ["ekf"])]
     assert rows == [
         ["wavg", "on", "0", "0.5", "0.00"],
@@ -123,12 +125,12 @@ def test_a_sweep_is_one_table_with_the_values_below_each_other():
         ["ekf", "on", "0.1", "0.5", "3000.00"],
         ["ekf", "on", "0.25", "0.5", "5000.00"],
     ]
-    assert "css_array.scale_cell_error: 0.25" in printed(_study_table(SWEEP), 40)
+    assert "css_array.scale_cell_error: 0.25" in printed(_study_table(SWEEP, COLUMNS), 40)
 
 
 @pytest.mark.parametrize("width", [40, 80])
 def test_a_sweep_in_a_narrow_console(width):
-    text = printed(_study_table(SWEEP), width)
+    text = printed(_study_table(SWEEP, COLUMNS), width)
     assert "…" not in text
     for i in range(len(SWEEP)):
         assert f"{1000.0 * i + 5:.3f}" in text and f"{1000.0 * i + 1:.2f}" in text

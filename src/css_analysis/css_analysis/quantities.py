@@ -1,0 +1,416 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Every quantity that is measured of flights: the one table of names, units, headings, meanings and origins.
+
+Figures of merit of a flight, columns of a study, pass criteria, JSON objects, terminal tables and the tables of the
+README come from it.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from css_analysis.flight_metrics import EstimatorMeasures, Windows
+
+
+class CaseSums(NamedTuple):
+    """What a study summed up while C cases flew."""
+
+    totals: np.ndarray  # (C,) with the fields of `TALLY` of `css_monte_carlo.case_tallies` or `attitude_tallies`
+    histogram: np.ndarray  # (C, bins) heading errors after acquisition, or attitude errors once settled
+    bin_deg: float
+    period_s: float
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One quantity.
+
+    Attributes:
+        name: in figures of merit, criteria and JSON.
+        unit: in which it is given, empty for numbers without one.
+        heading: of a column in a terminal; empty: it has none there.
+        form: how a terminal shows a value.
+        description: what it is.
+        without_value: why it may have no value although there are truth and estimates.
+        measure: takes it from the log of a flight; None: only studies have it.
+        tally: (C,) values from the sums over cases, NaN for what never came; None: studies lack it.
+        attitude_tally: the same where an attitude filter is measured.
+        column: its name in a study, if that is another.
+        whole: it is a count.
+    """
+
+    name: str
+    unit: str
+    description: str
+    heading: str = ""
+    form: str = "{:.2f}"
+    without_value: str = ""
+    measure: Callable[[EstimatorMeasures], float | int | None] | None = None
+    tally: Callable[[CaseSums], np.ndarray] | None = None
+    attitude_tally: Callable[[CaseSums], np.ndarray] | None = None
+    column: str = ""
+    whole: bool = False
+
+    @property
+    def study_column(self) -> str:
+        """Its name in the tables of a study."""
+        return self.column or self.name
+
+    @property
+    def title(self) -> str:
+        """Heading of its column in a terminal, with the unit."""
+        return titled(self.heading, self.unit)
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A quantity over the cases of a study.
+
+    Attributes:
+        name: in JSON.
+        of: column of the study's table of cases.
+        over: `mean` or `max` of the cases that have a value, or the `share` of cases that have one.
+        heading, unit, form: as a `Quantity` has them.
+    """
+
+    name: str
+    of: str
+    over: str
+    heading: str
+    unit: str
+    form: str = "{:.2f}"
+
+    @property
+    def title(self) -> str:
+        """Heading of its column in a terminal, with the unit."""
+        return titled(self.heading, self.unit)
+
+
+def titled(heading: str, unit: str) -> str:
+    """A heading with its unit on a line of its own."""
+    return f"{heading}\n[{unit}]" if unit else heading
+
+
+def percentile_of_histogram(counts: np.ndarray, percent: float, bin_deg: float) -> float:
+    """Percentile [deg] of errors in bins of `bin_deg`, linear within a bin; NaN without any."""
+    total = int(counts.sum())
+    if total == 0:
+        return float("nan")
+    wanted = 0.01 * percent * total
+    up_to = np.cumsum(counts)
+    index = int(np.searchsorted(up_to, wanted))
+    before = int(up_to[index - 1]) if index else 0
+    return bin_deg * (index + (wanted - before) / int(counts[index]))
+
+
+def _mean(total: str, count: str, each: int = 1) -> Callable[[CaseSums], np.ndarray]:
+    """A sum over what it counts, of which every one stands for `each`."""
+    return lambda sums: _ratio(sums.totals[total], each * sums.totals[count])
+
+
+def _ratio(total: np.ndarray, count: np.ndarray) -> np.ndarray:
+    return np.divide(total, count, out=np.full(len(count), np.nan), where=count > 0)
+
+
+def _time(steps: str) -> Callable[[CaseSums], np.ndarray]:
+    """Time [s] of so many steps."""
+    return lambda sums: sums.totals[steps] * sums.period_s
+
+
+def _converging(sums: CaseSums) -> np.ndarray:
+    t = sums.totals
+    return np.where(t["within"] > 0, (t["away_first"] + t["away_later"]) * sums.period_s, np.nan)
+
+
+def _acquired(sums: CaseSums) -> np.ndarray:
+    step = sums.totals["acquired_step"]
+    return np.where(step >= 0, step * sums.period_s, np.nan)
+
+
+def _error_p95(sums: CaseSums) -> np.ndarray:
+    return np.array([percentile_of_histogram(row, 95.0, sums.bin_deg) for row in sums.histogram])
+
+
+def _first_attitude(sums: CaseSums) -> np.ndarray:
+    step = sums.totals["first_step"]
+    return np.where(step >= 0, step * sums.period_s, np.nan)
+
+
+def _largest_error(sums: CaseSums) -> np.ndarray:
+    return np.where(sums.totals["settled"] > 0, sums.totals["error_max"], np.nan)
+
+
+def _bias_nees(sums: CaseSums) -> np.ndarray:
+    nees = _mean("nees6_sum", "settled")(sums)
+    # a filter that estimates no bias has no covariance of it
+    return np.where(np.isfinite(nees), nees, np.nan)
+
+
+def _pointing_sunlit(sums: CaseSums) -> np.ndarray:
+    t = sums.totals
+    return _ratio(t["sunlit_pointing_sum"], t["away_first"] + t["away_later"] + t["within"])
+
+
+_NOT_ACQUIRED = "the flight or its truth has no 60 s with the Sun within 30 deg of the array normal, or none after them"
+_NOT_SETTLED = "no attitude was estimated from measures.settled_time on"
+
+_HEADING_MEAN = Quantity(
+    "heading_error_mean_deg",
+    "deg",
+    "mean angle of estimated to true Sun, sunlit, after acquisition; steps without an estimate do not enter",
+    heading="heading\nerror\nmean",
+    without_value=_NOT_ACQUIRED,
+    measure=EstimatorMeasures.heading_error_mean_deg,
+    tally=_mean("heading_sum", "headings"),
+)
+_HEADING_P95 = Quantity(
+    "heading_error_p95_deg",
+    "deg",
+    "95th percentile of the same angle",
+    heading="heading\nerror\n95 %",
+    without_value=_NOT_ACQUIRED,
+    measure=EstimatorMeasures.heading_error_p95_deg,
+    tally=_error_p95,
+)
+_CONVERGING = (
+    Quantity(
+        "power_positive_s",
+        "s",
+        "sunlit time with the Sun more than 30 deg off the array normal, the paper's time spent converging",
+        heading="con-\nverging",
+        form="{:.1f}",
+        without_value=_NOT_ACQUIRED,
+        measure=lambda m: m.flight.power_positive_s(),
+        tally=_converging,
+        column="converging_s",
+    ),
+    Quantity("converging_first_s", "s", "sunlit time converging before the first eclipse", tally=_time("away_first")),
+    Quantity("converging_later_s", "s", "sunlit time converging after the first eclipse", tally=_time("away_later")),
+    Quantity("acquired_s", "s", "time of the acquisition since the epoch", tally=_acquired),
+)
+_LATE = Quantity(
+    "heading_error_late_deg",
+    "deg",
+    "mean angle of estimated to true Sun over the last measures.late_time of sunlight",
+    tally=_mean("late_sum", "late"),
+)
+_ATTITUDE = (
+    Quantity(
+        "attitude_error_mean_deg",
+        "deg",
+        "of attitude filters: mean angle of the Euler rotation from estimated to true attitude, from "
+        "measures.settled_time on",
+        heading="attitude\nerror\nmean",
+        form="{:.3f}",
+        without_value=_NOT_SETTLED,
+        measure=EstimatorMeasures.attitude_error_mean_deg,
+        attitude_tally=_mean("error_sum", "settled"),
+    ),
+    Quantity(
+        "attitude_error_p95_deg",
+        "deg",
+        "95th percentile of the same angle",
+        heading="attitude\nerror\n95 %",
+        form="{:.3f}",
+        without_value=_NOT_SETTLED,
+        measure=EstimatorMeasures.attitude_error_p95_deg,
+        attitude_tally=_error_p95,
+    ),
+    Quantity(
+        "attitude_error_max_deg",
+        "deg",
+        "of attitude filters: largest angle of estimated to true attitude from measures.settled_time on",
+        heading="attitude\nerror\nmax",
+        attitude_tally=_largest_error,
+    ),
+    Quantity(
+        "gyro_bias_error_mean_deg_s",
+        "deg/s",
+        "of attitude filters: mean norm of the error of the estimated gyro bias from measures.settled_time on",
+        heading="gyro\nbias\nerror",
+        form="{:.4f}",
+        attitude_tally=_mean("bias_sum", "settled"),
+    ),
+    Quantity(
+        "attitude_nees",
+        "",
+        "mean normalised error squared of the attitude over the same steps, 3 if the filter is consistent",
+        heading="attitude\nNEES\n(3)",
+        without_value=_NOT_SETTLED,
+        measure=EstimatorMeasures.attitude_nees,
+        attitude_tally=_mean("nees3_sum", "settled"),
+    ),
+    Quantity(
+        "attitude_bias_nees",
+        "",
+        "of attitude filters: mean normalised error squared of attitude and gyro bias together, 6 if consistent",
+        heading="with\nbias\n(6)",
+        attitude_tally=_bias_nees,
+    ),
+    Quantity(
+        "attitude_nis",
+        "",
+        "of attitude filters: mean normalised innovation squared for each degree of freedom, 1 if consistent",
+        heading="NIS\n(1)\n",
+        form="{:.3f}",
+        attitude_tally=_mean("nis_sum", "innovations"),
+    ),
+    Quantity(
+        "first_attitude_s",
+        "s",
+        "of attitude filters: time of the first attitude since the epoch",
+        heading="first\natti-\ntude",
+        form="{:.1f}",
+        attitude_tally=_first_attitude,
+    ),
+)
+_POINTING = (
+    Quantity(
+        "pointing_error_mean_deg",
+        "deg",
+        "mean angle of array normal to true Sun, sunlit, after acquisition",
+        heading="pointing\nerror\nmean",
+        without_value=_NOT_ACQUIRED,
+        measure=lambda m: m.flight.pointing_error_mean_deg(),
+        tally=_mean("pointing_sum", "pointings"),
+    ),
+    Quantity(
+        "pointing_error_sunlit_deg",
+        "deg",
+        "the same over all sunlit steps, those before acquisition included",
+        measure=lambda m: m.flight.pointing_error_sunlit_deg(),
+        tally=_pointing_sunlit,
+    ),
+    Quantity(
+        "heading_error_sunlit_deg",
+        "deg",
+        "mean angle of estimated to true Sun over all sunlit steps with an estimate",
+        measure=EstimatorMeasures.heading_error_sunlit_deg,
+        tally=_mean("sunlit_heading_sum", "sunlit_headings"),
+    ),
+)
+_RATE_FINAL = Quantity(
+    "rate_final_deg_s",
+    "deg/s",
+    "mean norm of the true body rate over the last 60 s",
+    heading="final\nrate",
+    form="{:.3f}",
+    measure=lambda m: m.flight.rate_final_deg_s(),
+    tally=_mean("final_sum", "final"),
+)
+_REST = (
+    Quantity("wheel_momentum_max", "N m s", "largest momentum of all wheels", tally=lambda s: s.totals["momentum_max"]),
+    Quantity(
+        "wheel_momentum_final", "N m s", "momentum of all wheels at the end", tally=lambda s: s.totals["momentum"]
+    ),
+    Quantity(
+        "nees_mean",
+        "",
+        "mean normalised error squared across the Sun line for each degree of freedom, 1 if consistent",
+        tally=_mean("nees_sum", "consistencies", each=2),
+    ),
+    Quantity(
+        "nis_mean",
+        "",
+        "mean normalised innovation squared for each degree of freedom, 1 if consistent",
+        tally=_mean("nis_sum", "innovations"),
+    ),
+    Quantity(
+        "steps_without_estimate",
+        "",
+        "sunlit steps of the flight at which the estimator had none",
+        heading="steps\nwithout\nestimate",
+        form="{:d}",
+        measure=EstimatorMeasures.steps_without_estimate,
+        tally=lambda sums: sums.totals["without_estimate"],
+        attitude_tally=lambda sums: sums.totals["without_estimate"],
+        whole=True,
+    ),
+)
+
+
+def quantities(windows: Windows) -> tuple[Quantity, ...]:
+    """All quantities in the order of tables, those of windows that a mission does not ask for left out."""
+    return (
+        *_CONVERGING,
+        _HEADING_MEAN,
+        _HEADING_P95,
+        *((_LATE,) if windows.late_time > 0.0 else ()),
+        *_ATTITUDE,
+        *_POINTING,
+        _RATE_FINAL,
+        *(_reported(windows.report_time) if windows.report_time > 0.0 else ()),
+        *_REST,
+    )
+
+
+def _reported(time: float) -> tuple[Quantity, Quantity]:
+    """The rates at a time [s] from the epoch, which is part of their names."""
+    minutes = f"{time / 60.0:g}"
+    return (
+        Quantity(
+            f"rate_{minutes}min_deg_s",
+            "deg/s",
+            f"mean norm of the true body rate over the minute before {minutes} min from the epoch",
+            heading=f"rate at\n{minutes} min\n",
+            form="{:.3f}",
+            tally=_mean("reported_sum", "reported"),
+        ),
+        Quantity(
+            f"rate_knowledge_{minutes}min_deg_s",
+            "deg/s",
+            "mean norm of the error of the estimated body rate over the same minute",
+            heading="its\nerror\n",
+            form="{:.3f}",
+            tally=_mean("reported_knowledge_sum", "reported"),
+        ),
+    )
+
+
+QUANTITIES = {quantity.name: quantity for quantity in quantities(Windows()) if quantity.measure is not None}
+"""What every flight is measured by, and criteria may ask for, by name."""
+
+
+def study_quantities(windows: Windows) -> tuple[Quantity, ...]:
+    """What a study measures of its cases, with the estimates of a Sun estimator."""
+    return tuple(quantity for quantity in quantities(windows) if quantity.tally is not None)
+
+
+def attitude_quantities(windows: Windows) -> tuple[Quantity, ...]:
+    """What a study measures of its cases, with the estimates of an attitude filter."""
+    return tuple(quantity for quantity in quantities(windows) if quantity.attitude_tally is not None)
+
+
+def summaries(windows: Windows) -> tuple[Summary, ...]:
+    """What is told of all cases of one configuration of a study."""
+    reported = _reported(windows.report_time) if windows.report_time > 0.0 else ()
+    return (
+        _mean_over_cases(_HEADING_MEAN),
+        _mean_over_cases(_HEADING_P95),
+        Summary("power_positive_fraction", "acquired_s", "share", "power\nposi-\ntive\n", "", "{:.1%}"),
+        Summary("converging_mean_s", "converging_s", "mean", "con-\nverging\nmean", "s", "{:.1f}"),
+        Summary("converging_max_s", "converging_s", "max", "con-\nverging\nmax", "s", "{:.1f}"),
+        *map(_mean_over_cases, reported),
+    )
+
+
+def attitude_summaries(windows: Windows) -> tuple[Summary, ...]:
+    """What is told of all cases of one configuration with an attitude filter."""
+    return tuple(map(_attitude_over_cases, attitude_quantities(windows)))
+
+
+def _attitude_over_cases(quantity: Quantity) -> Summary:
+    over = "max" if quantity.name == "attitude_error_max_deg" else "mean"
+    form = "{:.1f}" if quantity.whole else quantity.form
+    return Summary(quantity.name, quantity.study_column, over, quantity.heading, quantity.unit, form)
+
+
+def _mean_over_cases(quantity: Quantity) -> Summary:
+    return Summary(quantity.name, quantity.study_column, "mean", quantity.heading, quantity.unit, quantity.form)
+
+
+def readme_rows(table: Iterable[Quantity]) -> list[str]:
+    """Lines of the README's table."""
+    return [f"| {' '.join(filter(None, (f'`{q.name}`', q.unit and f'[{q.unit}]')))} | {q.description} |" for q in table]
