@@ -6,6 +6,7 @@ import pytest
 from listing import estimators_by_mission
 
 from css_common.mission import default_mission, load_mission, mission_from_text
+from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
@@ -151,7 +152,7 @@ REFUSED = {
 @pytest.mark.parametrize("case", REFUSED)
 def test_what_the_loop_has_no_place_for_is_named(case):
     text, reason = REFUSED[case]
-    with pytest.raises(NoPlace) as error:
+    with pytest.raises(MissionError) as error:
         MissionFlight(mission_from_text(text, "scripted"))
     assert reason in str(error.value)
     assert "\n" not in str(error.value)
