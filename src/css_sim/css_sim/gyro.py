@@ -95,17 +95,22 @@ def _read_out(p: Gyro, rate: float) -> float:
 
 
 @kernel
-def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
-    """Measured body rate [rad/s] at a control cycle."""
+def read(p: Gyro, errors: GyroErrors, bias_b: Vec3, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle, with the bias of that cycle (`bias_at`)."""
     w = multiply(errors.response, omega_bn_b)
-    b = bias_at(p, errors, key, step)
-    x, y, z = w[0] + b[0], w[1] + b[1], w[2] + b[2]
+    x, y, z = w[0] + bias_b[0], w[1] + bias_b[1], w[2] + bias_b[2]
     if p.noise > 0.0:
         n = normal4(key, Stream.GYRO_NOISE, step, 0)
         x += p.noise * n[0]
         y += p.noise * n[1]
         z += p.noise * n[2]
     return (_read_out(p, x), _read_out(p, y), _read_out(p, z))
+
+
+@kernel
+def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle."""
+    return read(p, errors, bias_at(p, errors, key, step), key, step, omega_bn_b)
 
 
 def variance(p: Gyro) -> float:
