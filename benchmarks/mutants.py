@@ -4,8 +4,9 @@
 Mutants (sign, operator, comparison, number, condition, statement, index; `mutations.py`) are drawn with a fixed seed,
 evenly over the packages, in each by lines. Each is tested in a copy of the project, in which kernels are compiled as
 ever, by the test files of its package that import its module, directly or not, nearest first, then by a few of other
-packages, to the first failure. A test that fails without the mutant too is left out. Limits are in processor time: a
-test that takes too long has noticed the mutant; when all of them together take too long the verdict is open.
+packages, to the first failure. That test has to fail once more, and to pass without the mutant; another one is left
+out. Limits are in processor time: a test that takes too long has noticed the mutant; when all of them together take
+too long the verdict is open.
 
 Verdicts are lines of JSON in a file; what stands there is not tested again, so that a run can be continued. The last
 line is one JSON object. Survivors that do the same as the original are listed in `equivalent_mutants.json`, with the
@@ -29,7 +30,7 @@ import sys
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -112,15 +113,24 @@ class Trial:
         self._write(mutant.file, mutant.mutation.applied(mutant.source))
         verdict, by = SURVIVED, ""
         for files in filter(None, (own, others)):
-            outcome, by, used = self._run(files, left)
-            while outcome == KILLED and by and not self._passes_without(mutant, by):
-                outcome, by, used = self._run(files, left)
+            outcome, by, used = self._confirmed(mutant, files, left)
             left -= used
             if outcome != SURVIVED or left <= 0.0:
                 verdict = outcome if outcome != SURVIVED else OPEN
                 break
         self._write(mutant.file, mutant.source)
         return {"verdict": verdict, "by": by, "cpu_s": round(self._seconds - left, 1), "wall_s": time.time() - began}
+
+    def _confirmed(self, mutant: Mutant, files: list[Path], seconds: float) -> tuple[str, str, float]:
+        """As `_run`; a test that failed has to fail again by itself, and to pass without the mutant."""
+        doubtful: list[str] = []
+        while True:
+            outcome, by, used = self._run(files, seconds, doubtful)
+            if outcome != KILLED or not by or by in doubtful:
+                return outcome, by, used
+            if self._passes_without(mutant, by) and self._run([by], seconds)[0] == KILLED:
+                return outcome, by, used
+            doubtful.append(by)
 
     def _passes_without(self, mutant: Mutant, test: str) -> bool:
         if test not in self._sound:
@@ -136,16 +146,18 @@ class Trial:
         self._written += 2  # bytecode is told from its source by seconds and size
         os.utime(place, (self._written, self._written))
 
-    def _run(self, files: list[Path] | list[str], seconds: float) -> tuple[str, str, float]:
+    def _run(
+        self, files: list[Path] | list[str], seconds: float, left_out: Iterable[str] = ()
+    ) -> tuple[str, str, float]:
         """Verdict of some tests, the one that failed or was under way, and the processor time used [s]."""
         progress = self._copy / "progress.json"
         progress.unlink(missing_ok=True)
-        broken = [f"--deselect={test}" for test, sound in self._sound.items() if not sound]
+        broken = {*left_out, *(test for test, sound in self._sound.items() if not sound)}
         names = [str(file.relative_to(self._copy)) if isinstance(file, Path) else file for file in files]
         command = [sys.executable, "-m", "pytest", "-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "one_test"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         process = subprocess.Popen(
-            [*command, *broken, *names],
+            [*command, *(f"--deselect={test}" for test in sorted(broken)), *names],
             cwd=self._copy,
             env=self._environment(progress),
             stdout=subprocess.PIPE,
@@ -266,6 +278,7 @@ def main() -> int:
     options = parser.parse_args()
     options.verdicts.parent.mkdir(parents=True, exist_ok=True)
     found, interrupted = [], False
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         for entry in tested(options, read_verdicts(options.verdicts)):
             found.append(entry)

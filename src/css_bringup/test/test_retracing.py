@@ -114,6 +114,13 @@ def test_a_change_without_effect_on_the_bytes_is_made_all_the_same():
     assert comparison.identical and retrace.unplaced == []
 
 
+@pytest.mark.parametrize("step", [2, 59, 60])
+def test_a_node_that_was_restarted_begins_anew_in_the_replay_too(step):
+    retrace, comparison = retraced(flown(100, lambda s, k: stepper() if k == step else None), 100)
+    assert comparison.identical and comparison.compared == 100
+    assert retrace.notes == [f"the estimator began anew in flight at stamp {stamp(step)} ns"]
+
+
 def test_a_node_that_was_restarted_has_lost_what_was_set_in_it():
     def act(s: Stepper, k: int) -> Stepper | None:
         if k == 33:

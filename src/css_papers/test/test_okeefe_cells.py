@@ -3,11 +3,15 @@
 
 import numpy as np
 import pytest
+from matplotlib.image import AxesImage
+from matplotlib.text import Text
 
 from css_analysis.flight_log import to_body
 from css_common.mission import load_mission
 from css_environment.mission_environment import MissionEnvironment
+from css_environment.reflectivity import HIGHEST, LOWEST, zonal_reflectivity
 from css_papers.cell_outputs import albedo_peaks, orbit_outputs, response, sun_pointing
+from css_papers.okeefe import cell_figures
 
 MISSION = load_mission("okeefe_2013")
 SHORT = MISSION.with_overrides(["mission.duration=600"])
@@ -24,6 +28,26 @@ def test_the_response_is_the_cosine_and_equation_16():
         curve.warped[inside], curve.ideal[inside] * (1.0 + 0.5 * beta**2 - 0.65 * beta**4), atol=1e-12
     )
     np.testing.assert_allclose(curve.degraded, 0.95 * curve.warped)
+
+
+@pytest.mark.parametrize(
+    ("draw", "words"),
+    [("mean", "not used: every case flies with the mean"), ("common", "drawn for each case"), ("per_cell", "drawn")],
+)
+def test_the_map_of_reflectivity_shows_what_flies_and_says_whether_it_is_drawn(draw, words, tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(cell_figures, "save", lambda figure, file: figures.append(figure))
+    mission = MISSION.with_overrides([f"css_array.albedo.draw={draw}", "css_array.albedo.factor=0.5"])
+    cell_figures.write_reflectivity(mission, tmp_path / "map.png")
+    texts = [text.get_text() for text in figures[0].findobj(Text)]
+    assert "factor 0.5 included" in texts
+    assert any(text.startswith(words) for text in texts)
+    mean, deviation = (image.get_array() for image in figures[0].findobj(AxesImage))
+    assert 0.5 * LOWEST <= mean.min() < mean.max() <= 0.5 * HIGHEST
+    zonal = zonal_reflectivity(1)
+    np.testing.assert_allclose(deviation[:, :1], 0.5 * zonal.std)
+    if draw == "mean":
+        np.testing.assert_allclose(mean[:, :1], 0.5 * zonal.mean)
 
 
 @pytest.mark.parametrize("sun_n", [(1.0, 0.0, 0.0), (0.6, 0.0, -0.8), (-0.48, 0.6, 0.64)])

@@ -129,6 +129,16 @@ def test_saturation_is_reported():
     assert np.abs(cycle.torques).max() == pytest.approx(0.030)
 
 
+def test_saturation_of_the_rods_is_reported_while_they_work():
+    cycle = Cycle(dumping__enabled=True, rods__fitted=True, rods__max_dipole=0.5)
+    sample = {"speeds": (600.0, -500.0, 300.0, 100.0), "field": (2e-5, 1e-5, -3e-5)}
+    output = cycle.step(**sample, field_valid=True)
+    assert output.dumping and output.rods_saturated != 0
+    assert np.abs(cycle.dipoles).max() == pytest.approx(0.5)
+    output = cycle.step(**sample, field_valid=False)
+    assert not output.dumping and output.rods_saturated == 0
+
+
 def test_dumping_in_the_shadow_alone():
     cycle = Cycle(dumping__enabled=True, dumping__when="eclipse", rods__fitted=True)
     sample = {"speeds": (100.0, -50.0, 30.0, 10.0), "field": (2e-5, 1e-5, -3e-5), "field_valid": True}
