@@ -120,21 +120,26 @@ def test_the_same_over_several_blocks_and_scripted_changes():
       failed: {time: 135.0, node: css_array, action: set, parameter: faults, value: ['2 dead']}
       on: {time: 140.0, node: gyro, action: activate}
     """
-    mission = mission_from_text(f"/**:\n  ros__parameters:\n    mission: {{duration: 150.0}}{events}", "scripted")
+    mission = mission_from_text(
+        f"/**:\n  ros__parameters:\n    extends: okeefe_2013\n    mission: {{duration: 150.0}}{events}", "scripted"
+    )
     assert same_steps(mission) == 1500 > BLOCK_STEPS
 
 
 REFUSED = {
     "another event": (
-        "/**: {ros__parameters: {events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
+        "/**: {ros__parameters: {extends: okeefe_2013, "
+        "events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
         "scripted: events.a: the Monte Carlo switches sensors alone, here gyro; fly it on the graph",
     ),
     "no control": (
-        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_estimation/ekf]}}}",
+        "/**: {ros__parameters: {extends: okeefe_2013, "
+        "graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_estimation/ekf]}}}",
         "scripted: no node of graph.nodes is MrpControl, which the Monte Carlo needs",
     ),
     "two gyros": (
-        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
+        "/**: {ros__parameters: {extends: okeefe_2013, "
+        "graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
         "css_sim/gyro, css_estimation/ekf, sunpoint_control/mrp_control]}}}",
         "two",
     ),
