@@ -138,7 +138,7 @@ def test_a_coarser_field_model_than_the_truths(totals):
 @pytest.mark.parametrize(
     ("overrides", "expected"),
     [
-        (("wheels.fitted=true",), "wheels.fitted"),
+        (("wheels.axes=1,0,0,0,1,0,0,0,1", "wheels.fitted=true"), "wheels.fitted"),
         (("css_array.albedo.enabled=true", "css_array.albedo.draw=common"), "albedo.draw"),
         (("css_array.albedo.enabled=true", "css_array.albedo.draw=per_cell"), "albedo.draw"),
     ],
