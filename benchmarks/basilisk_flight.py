@@ -21,6 +21,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from Basilisk.architecture import messaging
@@ -113,15 +114,17 @@ class Flight:
         cpu_s = time.process_time() - began
         return {"steps": round(scenario["duration"] / scenario["period"]), "cpu_s": cpu_s, **self._errors()}
 
-    def _step(self, module, name: str):
+    def _step(self, module, name: str) -> Any:
         """Calls a module once a cycle, after those named before it."""
         module.ModelTag = name
         self.simulation.AddModelToTask("cycle", module)
         return module
 
     def _environment(self) -> None:
-        """Sun and orientation of the Earth as at the middle of the flight: over an orbit the Sun moves by 0.06 deg, and
-        a zonal Earth looks the same however it has turned."""
+        """Sun and orientation of the Earth as at the middle of the flight.
+
+        Over an orbit the Sun moves by 0.06 deg, and a zonal Earth looks the same however it has turned.
+        """
         scenario = self.scenario
         sun = messaging.SpicePlanetStateMsgPayload(PlanetName="sun", PositionVector=scenario["sun_position_n"])
         earth = messaging.SpicePlanetStateMsgPayload(PlanetName="earth", J20002Pfix=scenario["dcm_en"])

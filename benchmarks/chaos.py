@@ -49,8 +49,9 @@ def main() -> int:
                 place.mkdir()
                 for outcome in fly(reference, place, arguments.seed * 1000 + number):
                     counted.update(outcome.counts())
-            counts[kind] = dict(sorted(counted.items()))
-            print(f"{kind:18}", counts[kind], flush=True)
+                    # one that is interrupted has said how far it came
+                    counts[kind] = dict(sorted(counted.items()))
+                    print(f"{kind:18}", counts[kind], flush=True)
     if arguments.json:
         arguments.json.write_text(json.dumps(counts, indent=1), encoding="utf-8")
     print(json.dumps(counts))

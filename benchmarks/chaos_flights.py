@@ -130,6 +130,7 @@ class Harm:
         self.done = False
 
     def __call__(self, supervisor: Supervisor) -> None:
+        """Looks whether it is time, whenever the supervisor looks after its processes."""
         size = sum(file.stat().st_size for file in self._bag.glob("*.mcap"))
         if self.done or size < self._size:
             return

@@ -160,5 +160,24 @@ def test_extrema_and_sinusoid_of_a_dense_series():
     assert (sine.offset, sine.slope) == pytest.approx((0.4, 0.001), abs=1e-12)
 
 
+def test_motions_are_fitted_over_fifteen_seconds_each(up_leg, monkeypatch):
+    """Candidates to the middle of the window; the mean is over all of it, cut into equal parts."""
+    spans = []
+
+    def note(pulses, *arguments):
+        spans.append((pulses.time.min(), pulses.time.max()))
+
+    monkeypatch.setattr("css_estimation.spin.coning.fit_motion", note)
+    passages = up_leg.passages.between(5.0, 65.0)
+    coning = analyse_coning(passages, INCLINATION)
+    start, end = passages.time[0], passages.time[-1]
+    turn = 1.0 / 5.45
+    middle = 0.5 * (start + end)
+    count = len(coning.candidates)
+    np.testing.assert_allclose(spans[:count], [(middle - 7.5, middle + 7.5)] * count, atol=1.5 * turn)
+    quarters = np.linspace(start, end, 5)
+    np.testing.assert_allclose(spans[count:], np.stack((quarters[:-1], quarters[1:]), 1), atol=1.5 * turn)
+
+
 def test_too_few_passages_give_no_coning(up_leg):
     assert analyse_coning(up_leg.passages.between(0.0, 2.0), INCLINATION) is None

@@ -2,6 +2,7 @@
 """Who may import whom: down only, never sideways. `docs/architecture.md` shows the same rooms."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -166,3 +167,9 @@ def test_what_is_not_public_in_rclpy_is_taken_in_one_place():
     found = {m: list(private_names(tree)) for m, tree in MODULES.items() if m.split(".")[0] in ON_ROS}
     assert len(found.pop("css_common.ros_internals")) >= 5
     assert {module: names for module, names in found.items() if names} == {}
+
+
+def test_all_packages_have_one_version_which_the_changelog_knows():
+    manifests = {path: path.read_text(encoding="utf-8") for path in SOURCES.glob("*/package.xml")}
+    (version,) = {re.search(r"<version>(.*?)</version>", text)[1] for text in manifests.values()}
+    assert f"\n## {version}\n" in (SOURCES.parent / "CHANGELOG.md").read_text(encoding="utf-8")

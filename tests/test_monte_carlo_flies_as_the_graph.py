@@ -4,9 +4,11 @@
 import numpy as np
 import pytest
 from flights import fly_composed
+from listing import estimators_by_mission
 
 from css_analysis.flight_log import read_flight
 from css_common.mission import find_mission, load_mission, mission_from_text
+from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import configured
 from css_monte_carlo.mission_flight import MissionFlight
@@ -20,6 +22,8 @@ EVENTS = """
 # The flight begins in the shadow and leaves it after 31 s, while the gyro is off.
 OVERRIDES = ["mission.duration=60.0", "orbit.true_anomaly_deg=269.75"]
 CASE = 7
+FLOWN = estimators_by_mission(SunEstimator)
+SAFE_HOLD = [(name, estimator) for name in FLOWN if name != "okeefe_2013" for estimator in FLOWN[name]]
 
 
 def trace_of_log(log, estimator):
@@ -29,7 +33,7 @@ def trace_of_log(log, estimator):
     return np.hstack((*columns, log.having("torque_command").torque, log.having("wheels").speed))
 
 
-@pytest.mark.parametrize("estimator", ["ekf", "wavg", "wls"])
+@pytest.mark.parametrize("estimator", FLOWN["okeefe_2013"])
 def test_every_step_of_a_case_equals_that_of_the_composed_graph(estimator, tmp_path):
     text = find_mission("okeefe_2013").read_text().replace("    criteria:", EVENTS + "    criteria:")
     mission = mission_from_text(text, "scripted", OVERRIDES)
@@ -47,16 +51,17 @@ def test_every_step_of_a_case_equals_that_of_the_composed_graph(estimator, tmp_p
     assert len(sources) == 3, "the flight has steps with gyro, with rates from the Sun and without any"
 
 
-def test_safe_hold_with_magnetometer_and_rods_equals_the_composed_graph(tmp_path):
+@pytest.mark.parametrize(("name", "estimator"), SAFE_HOLD)
+def test_safe_hold_with_magnetometer_and_rods_equals_the_composed_graph(name, estimator, tmp_path):
     """From the shadow, where the rods work, past sunrise."""
-    mission = load_mission("clark_1996_pyramid", ["mission.duration=150.0", "orbit.true_anomaly_deg=43.0"])
+    mission = load_mission(name, ["mission.duration=150.0", "orbit.true_anomaly_deg=43.0"])
     fly_composed(configured(mission, case=CASE), tmp_path / "bag")
     log = read_flight(tmp_path / "bag")
-    estimates = log.estimates["pyramid_switch"]
+    estimates = log.estimates[estimator]
     assert not log.sunlit[0] and log.sunlit[-1]
     assert np.any(log.having("control").dumping)
     assert SunEstimate.RATE_FIELD in estimates.rate_source
 
     trace = fly_cases(MissionFlight(mission), np.array([CASE]), 10, traced=True).trace[0]
-    np.testing.assert_array_equal(trace, trace_of_log(log, "pyramid_switch"))
+    np.testing.assert_array_equal(trace, trace_of_log(log, estimator))
     assert len(trace) == 300

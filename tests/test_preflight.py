@@ -8,6 +8,7 @@ import re
 import numpy as np
 import pytest
 from flights import short_mission
+from listing import MISSIONS
 
 from css_bringup.commands import fly
 from css_common.command import USAGE
@@ -23,7 +24,6 @@ from css_papers.okeefe.configurations import AS_PRINTED, IMPROVED
 from css_sim.flight_checks import FASTEST, MotionError, check_rate
 from css_sim.nodes.dynamics import Dynamics
 
-MISSIONS = ("okeefe_2013", "clark_1996_flat", "clark_1996_pyramid", "cubesat_vmm", "esprit_2006")
 UNSTABLE = "mrp_control.gains.p=5000"
 
 

@@ -39,8 +39,10 @@ def test_each_is_understood_by_its_own_parser(verb, arguments):
     entry = VERBS[verb]
     if not entry.package:
         return
-    (file,) = ROOT.glob(f"src/{entry.package}/{entry.package}/*s/{entry.executable}.py")  # nodes or commands
-    module = importlib.import_module(f"{entry.package}.{file.parent.name}.{entry.executable}")
+    folders = ("nodes", "commands")
+    files = [ROOT / "src" / entry.package / entry.package / name / f"{entry.executable}.py" for name in folders]
+    (folder,) = [file.parent.name for file in files if file.is_file()]
+    module = importlib.import_module(f"{entry.package}.{folder}.{entry.executable}")
     module._parser().parse_args(arguments)  # ends the process where it is wrong
 
 

@@ -10,8 +10,8 @@ import pytest
 from flights import fly_composed, messages_by_topic, short_mission
 from rclpy.node import Node
 
-from css_bringup.commands.fly import conclude
 from css_bringup.composed import ComposedFlight
+from css_bringup.verbs.fly import conclude
 from css_common.codec import codec_of
 from css_common.command import FAILED
 from css_common.executor import retire

@@ -107,7 +107,7 @@ def test_interrupt_reaches_the_executable(prefix):
     assert process.stdout.readline() == "ready\n"
     time.sleep(0.05)
     process.send_signal(signal.SIGINT)
-    assert process.communicate(timeout=10)[0] == "caught\n"
+    assert process.communicate(timeout=100)[0] == "caught\n"
     assert process.returncode == 3
 
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from types import FrameType
 
 TAIL_LINES = 25
+_STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 class CommandFailed(Exception):
@@ -102,24 +103,31 @@ def run(step: Step, command: Sequence[str | Path], env: Mapping[str, str], cwd: 
         begin = output.tell()
         output.write(f"$ {' '.join(map(str, command))}\n".encode())
         output.flush()
-        process = subprocess.Popen(
-            command,
-            env=dict(env),
-            cwd=cwd,
-            stdin=subprocess.DEVNULL,
-            stdout=output,
-            stderr=subprocess.STDOUT,
-            process_group=0,  # stopped as a whole, with the compilers that it started
-            close_fds=False,  # the installation lock is inherited, to last while any command still works
-        )
+        # a stop that comes while the command is being started waits until there is something to be stopped
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
+        process = None
         try:
+            process = subprocess.Popen(
+                command,
+                env=dict(env),
+                cwd=cwd,
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                process_group=0,  # stopped as a whole, with the compilers that it started
+                close_fds=False,  # the installation lock is inherited, to last while any command still works
+                preexec_fn=lambda: signal.pthread_sigmask(signal.SIG_SETMASK, before),
+            )
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
             while True:
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     code = process.wait(timeout=0.2)
                     break
                 step.tick()
         except BaseException:
-            _stop(process)
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+            if process is not None:
+                _stop(process)
             raise
     if code != 0:
         with log.open("rb") as written:

@@ -80,8 +80,12 @@ def _tangent_nees_of_rows(sun_hat_b, covariance, sun_b, nees_out) -> None:
 
 
 def attitude_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Steps of the truth (K,) that have an attitude, angles (K,) [rad] of the Euler rotation from the estimated to the
-    true attitude there, and normalised errors squared (K,), chi-square of three degrees of freedom if consistent."""
+    """Errors of an attitude filter at the steps of the truth that have an attitude.
+
+    Returns:
+        Steps (K,); angles (K,) [rad] of the Euler rotation from the estimated to the true attitude; normalised errors
+        squared (K,), chi-square of three degrees of freedom if consistent.
+    """
     attitudes = log.attitudes[name]
     rows, steps = estimated_rows(log, name)
     errors, nees = np.empty(len(rows)), np.empty(len(rows))

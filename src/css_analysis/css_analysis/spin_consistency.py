@@ -106,7 +106,8 @@ def _attitude(
         field_b = multiply(payload_state(motion, k * spacing).dcm_bn, field_n)
         samples.append(magnetometer.measure(p, bias_b, key, k, field_b))
     u = time / spacing - (first + 1)
-    field = interpolated_field(*samples, u)
+    before, left, right, after = samples
+    field = interpolated_field(before, left, right, after, u)
     rate = float(record.passages.rate[-1])
     variance = interpolated_variance(magnetometer.variance(p), float(np.linalg.norm(field)), rate * spacing, u)
     at = environment.at(time)

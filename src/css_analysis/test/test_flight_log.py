@@ -15,17 +15,22 @@ from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
 
-RANDOM = np.random.default_rng(1)
 STEPS = 25
 
 
-def random_columns(message_type: type, steps: int = STEPS) -> Columns:
+@pytest.fixture
+def rng():
+    """Numbers of this test alone: they do not depend on which others run."""
+    return np.random.default_rng(1)
+
+
+def random_columns(rng, message_type: type, steps: int = STEPS) -> Columns:
     """Columns with random numbers of each field's kind."""
     result = columns(message_type, stamps(steps))
     for name, values in vars(result).items():
         if name != "stamp_ns":
             values[...] = (
-                RANDOM.integers(0, 2, values.shape) if values.dtype.kind != "f" else RANDOM.normal(size=values.shape)
+                rng.integers(0, 2, values.shape) if values.dtype.kind != "f" else rng.normal(size=values.shape)
             )
     return result
 
@@ -38,9 +43,9 @@ def assert_equal(a: Columns, b: Columns) -> None:
 
 @pytest.mark.parametrize("frame", ["bus", "eci", "a_long_frame"])
 @pytest.mark.parametrize("message_type", [SpacecraftState, SunEstimate, CssVoltages, WheelState, ControlStatus])
-def test_the_stacked_view_equals_decoding_each_message(message_type, frame):
+def test_the_stacked_view_equals_decoding_each_message(rng, message_type, frame):
     codec = codec_of(message_type)
-    written = random_columns(message_type)
+    written = random_columns(rng, message_type)
     names = [field.name for field in codec.fields]
     data = [
         codec.encode(codec.sample(int(stamp), frame, **{n: getattr(written, n)[i] for n in names}))
@@ -82,9 +87,9 @@ def test_no_messages_are_empty_columns():
     assert len(stack(codec_of(SunEstimate), [])) == 0
 
 
-def test_body_vectors_against_scipy():
-    sigma_bn = RANDOM.normal(size=(50, 3)) * 0.3
-    vectors_n = RANDOM.normal(size=(50, 3))
+def test_body_vectors_against_scipy(rng):
+    sigma_bn = rng.normal(size=(50, 3)) * 0.3
+    vectors_n = rng.normal(size=(50, 3))
     expected = Rotation.from_mrp(sigma_bn).inv().apply(vectors_n)
     np.testing.assert_allclose(to_body(sigma_bn, vectors_n), expected, atol=1e-14)
 
@@ -94,21 +99,21 @@ def test_angles_are_accurate_at_both_ends():
     np.testing.assert_allclose(angle(tilted([1e-7, 30.0, 180.0 - 1e-7]), z), np.radians([1e-7, 30.0, 180.0 - 1e-7]))
 
 
-def full_recording(folder):
+def full_recording(rng, folder):
     sun_b = tilted(np.linspace(0.0, 40.0, STEPS))
     topics = {
         "/truth": (SpacecraftState, truth(np.linspace(0.0, 40.0, STEPS))),
-        "/css/voltages": (CssVoltages, random_columns(CssVoltages)),
+        "/css/voltages": (CssVoltages, random_columns(rng, CssVoltages)),
         "/ekf/sun_estimate": (SunEstimate, estimates(sun_b, rate_source=1)),
         "/wavg/sun_estimate": (SunEstimate, estimates(sun_b)),
-        "/wheels/state": (WheelState, random_columns(WheelState)),
-        "/control/status": (ControlStatus, random_columns(ControlStatus)),
+        "/wheels/state": (WheelState, random_columns(rng, WheelState)),
+        "/control/status": (ControlStatus, random_columns(rng, ControlStatus)),
     }
     return topics, folder
 
 
-def test_a_recording_comes_back(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
+def test_a_recording_comes_back(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
     log = read_flight(record(folder, topics))
     assert list(log.estimates) == ["ekf", "wavg"]
     for topic, attribute in {
@@ -126,8 +131,8 @@ def test_a_recording_comes_back(tmp_path):
     np.testing.assert_allclose(np.degrees(log.pointing_error), np.linspace(0.0, 40.0, STEPS), atol=1e-12)
 
 
-def test_the_recorded_mission_tells_who_flew(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
+def test_the_recorded_mission_tells_who_flew(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
     mission = load_mission("okeefe_2013").with_overrides(["mission.epoch=2013-05-31T23:59:00Z"])
     log = read_flight(record(folder, topics, mission=mission.text()))
     assert log.flown == "ekf"
@@ -135,15 +140,15 @@ def test_the_recorded_mission_tells_who_flew(tmp_path):
     assert log.time(log.truth)[0] == pytest.approx(60.0)
 
 
-def test_an_invalid_mission_leaves_the_data_readable(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
+def test_an_invalid_mission_leaves_the_data_readable(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
     log = read_flight(record(folder, topics, mission="/**: {ros__parameters: {mission: {nmae: x}}}"))
     assert log.mission is None and len(log.truth) == STEPS
     assert "nmae" in log.notes[0] and "\n" not in log.notes[0]
 
 
-def test_foreign_names_are_recognised_by_type(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
+def test_foreign_names_are_recognised_by_type(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
     foreign = {
         "/sat7/obc/sun_estimate": topics["/ekf/sun_estimate"],
         "/sat7/heading": topics["/wavg/sun_estimate"],
@@ -156,15 +161,15 @@ def test_foreign_names_are_recognised_by_type(tmp_path):
     assert log.epoch_ns == EPOCH_NS
 
 
-def test_remapped_topics(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
+def test_remapped_topics(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
     log = read_flight(record(folder, topics), remap={"/ekf/sun_estimate": "/flight/sun_estimate"})
     assert set(log.estimates) == {"flight", "wavg"}
 
 
-def test_a_second_truth_is_left_out_with_a_note(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
-    log = read_flight(record(folder, {"/other": (SpacecraftState, random_columns(SpacecraftState, 3))} | topics))
+def test_a_second_truth_is_left_out_with_a_note(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
+    log = read_flight(record(folder, {"/other": (SpacecraftState, random_columns(rng, SpacecraftState, 3))} | topics))
     assert len(log.truth) == STEPS
     assert log.notes == ["of several topics with SpacecraftState one is taken, /truth if it is there"]
 
@@ -190,8 +195,8 @@ def test_names_of_estimators():
     assert estimator_of("/sun_estimate") == "sun_estimate"
 
 
-def test_stamps_of_other_clocks_belong_to_the_nearest_step(tmp_path):
-    topics, folder = full_recording(tmp_path / "flight")
+def test_stamps_of_other_clocks_belong_to_the_nearest_step(rng, tmp_path):
+    topics, folder = full_recording(rng, tmp_path / "flight")
     log = read_flight(record(folder, topics))
     shifted = estimates(tilted(np.zeros(STEPS)))
     shifted.stamp_ns = shifted.stamp_ns + 30_000_000

@@ -15,7 +15,7 @@ from css_analysis.flight_metrics import acquisition, sunlit_passes
 from css_analysis.flight_summary import criteria_failures, print_summary
 from css_analysis.quantities import QUANTITIES
 from css_common.mission import load_mission
-from css_msgs.msg import ControlStatus
+from css_msgs.msg import AttitudeEstimate, ControlStatus
 
 
 def steps(seconds: float) -> int:
@@ -63,6 +63,32 @@ def test_acquisition_is_the_first_minute_within_thirty_degrees():
     assert acquisition(flight(np.full(601, 10.0))) == 0
     assert acquisition(flight(np.full(600, 10.0))) is None, "59.9 s are no minute"
     assert acquisition(flight(np.full(900, 10.0), np.repeat([1.0, 0.0, 1.0], 300))) is None
+
+
+def test_the_final_rate_is_that_of_the_last_minute():
+    """A rate that grows with time: its mean over a window tells where the window begins."""
+    log = flight(np.full(steps(200.0), 10.0), ekf=estimates(tilted(np.full(steps(200.0), 10.0))))
+    time = np.arange(steps(200.0)) * DT
+    log.truth.omega_bn_b[:, 0] = np.radians(0.01 * time)
+    (run,) = estimator_runs(log)
+    assert run["rate_final_deg_s"] == pytest.approx(0.01 * (time[-1] - 0.5 * (60.0 - DT)))
+
+
+def test_an_attitude_counts_from_three_hundred_seconds_on():
+    count = steps(400.0)
+    log = flight(np.full(count, 10.0))
+    # an error that falls with time about z, in the quaternion of an attitude whose truth is b = n
+    error = np.radians(5.0 - 0.01 * np.arange(count) * DT)
+    quaternion = np.stack((0.0 * error, 0.0 * error, np.sin(0.5 * error), np.cos(0.5 * error)), 1)
+    covariance = np.tile((np.radians(2.0) ** 2 * np.eye(6)).ravel(), (count, 1))
+    log.attitudes["filter"] = columns(
+        AttitudeEstimate, stamps(count), q_bn=quaternion, covariance=covariance, validity=2
+    )
+    (run,) = estimator_runs(log)
+    settled = np.degrees(error[steps(300.0) :])
+    assert run["attitude_error_mean_deg"] == pytest.approx(np.mean(settled), rel=1e-6)
+    assert run["attitude_error_p95_deg"] == pytest.approx(np.percentile(settled, 95.0), rel=1e-6)
+    assert run["attitude_nees"] == pytest.approx(np.mean((settled / 2.0) ** 2), rel=1e-3)
 
 
 def test_darkness_does_not_count():

@@ -21,7 +21,7 @@ from css_analysis.readable_table import ReadableTable
 from css_bringup.basilisk import LARGEST_ERROR_DEG, Basilisk
 from css_bringup.basilisk_scenario import basilisk_scenario, write_zonal_earth
 from css_bringup.json_process import MeasurementError, number, run_for_object
-from css_bringup.options import console, whole_number
+from css_bringup.options import console
 from css_bringup.processes import executable_path
 from css_bringup.report import print_json
 from css_common import places
@@ -41,22 +41,6 @@ class Measurement(NamedTuple):
 
 Side = Callable[[bool], Measurement]
 """Flies once, with albedo or without."""
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Options of the comparison."""
-    parser.add_argument(
-        "--duration", type=float, default=5550.0, help="simulated time of a flight [s] (default: 5550, one orbit)"
-    )
-    parser.add_argument("--repeats", type=whole_number, default=3, help="runs of each kind (default: %(default)s)")
-    parser.add_argument("--cases", type=whole_number, default=300, help="cases flown here (default: %(default)s)")
-    parser.add_argument(
-        "--estimator", choices=("wavg", "ekf"), default="wavg", help="estimator here (default: %(default)s)"
-    )
-    parser.add_argument(
-        "--peer-estimator", choices=("wls", "okeefe"), default="wls",
-        help="Basilisk's cssWlsEst or okeefeEKF (default: %(default)s)",
-    )  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> None:

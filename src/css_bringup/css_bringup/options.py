@@ -8,13 +8,10 @@ from pathlib import Path
 from rich.console import Console
 from rich.text import Text
 
-from css_analysis.quantities import QUANTITIES
 from css_common import command
 from css_common.domains import DomainError
-from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError
 from css_common.network import NetworkError
-from css_common.schema import unknown_name
 from css_recording.errors import BagError
 
 # without markup: units, paths and what people type may hold brackets
@@ -44,27 +41,6 @@ def add_domain_option(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--domain", metavar="N", help="ROS domain to fly in (default: ROS_DOMAIN_ID when set, else a free one)"
     )
-
-
-def mission_of(arguments: argparse.Namespace) -> Mission:
-    """The mission that the options describe.
-
-    Raises:
-        MissionError: it is wrong.
-    """
-    overrides = list(arguments.overrides)
-    for key in ("case", "seed", "duration"):
-        value = getattr(arguments, key)
-        if value is not None:
-            overrides.append(f"mission.{key}={value}")
-    mission = load_mission(arguments.mission, overrides)
-    for quantity in mission.criteria:
-        # measured by studies, which the packages that read missions know nothing of
-        if quantity not in QUANTITIES:
-            raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
-    for remark in mission.remarks:
-        complain("warning:", remark)
-    return mission
 
 
 def whole_number(text: str) -> int:

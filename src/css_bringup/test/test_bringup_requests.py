@@ -14,9 +14,11 @@ from css_bringup import options
 from css_bringup.commands import demo, fly
 from css_bringup.commands import replay as replay_command
 from css_bringup.flight_result import FlightResult, default_bag
+from css_bringup.mission_asked_for import mission_of
 from css_bringup.processes import Child, Supervisor
 from css_bringup.replay_pass import parse_request
 from css_bringup.report import flight_object
+from css_bringup.verbs import fly as fly_verb
 from css_common.command import FAILED, USAGE
 from css_common.mission import load_mission
 from css_common.mission_file import MissionError
@@ -78,7 +80,7 @@ def _mission_file(folder: Path, line: str) -> Path:
 def _mission_of(file: Path, *arguments: str):
     parser = argparse.ArgumentParser()
     options.add_mission_options(parser)
-    return options.mission_of(parser.parse_args([str(file), *arguments]))
+    return mission_of(parser.parse_args([str(file), *arguments]))
 
 
 def test_a_criterion_that_nobody_measures_is_refused_before_the_flight(tmp_path, capfd):
@@ -183,7 +185,7 @@ def test_a_recorder_that_died_is_what_a_failed_flight_reports(tmp_path, capfd):
     (tmp_path / "flight_0.mcap").write_bytes(b"")
     mission = load_mission("okeefe_2013")
     result = FlightResult(mission, steps=100, bag=tmp_path, failure="recorder died (SIGKILL)")
-    assert fly.conclude(mission, result, as_json=True) == FAILED
+    assert fly_verb.conclude(mission, result, as_json=True) == FAILED
     printed = capfd.readouterr()
     assert printed.err.splitlines() == ["the flight failed: recorder died (SIGKILL)"]
     assert json.loads(printed.out.splitlines()[-1])["runs"] == []

@@ -14,6 +14,7 @@ from css_bringup import processes, warden
 from css_bringup.child import Child, Pulse
 from css_bringup.processes import Supervisor
 from css_common.mission import load_mission
+from css_common.testing import DEADLINE
 
 SUPERVISED = """
 import time
@@ -125,7 +126,9 @@ def test_a_supervisor_that_was_dead_before_is_noticed(tmp_path):
     source, beating = os.pipe()
     environment = os.environ | {"SUNPOINT_SUPERVISOR": "1", "SUNPOINT_PULSE": str(beating)}
     command = [sys.executable, "-c", SUPERVISED]
-    done = subprocess.run(command, env=environment, pass_fds=(beating,), capture_output=True, timeout=60, check=False)
+    done = subprocess.run(
+        command, env=environment, pass_fds=(beating,), capture_output=True, timeout=DEADLINE, check=False
+    )
     assert done.returncode == -signal.SIGINT
     os.close(source)
     os.close(beating)

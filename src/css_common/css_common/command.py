@@ -2,8 +2,10 @@
 """The frame around every command: its name as it was typed, its help, one line for what is wrong, its exit code."""
 
 import argparse
+import importlib
 import math
 import os
+import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Never
@@ -106,6 +108,24 @@ def guarded(
     except KeyboardInterrupt:
         print(f"{short_name(prog)}: {interrupted}", file=sys.stderr, flush=True)
         return INTERRUPTED
+
+
+def implementation(module: str) -> Callable[..., int]:
+    """What a command does: `run` of a module that is loaded now, once options are read, for that takes a second.
+
+    Libraries take an exception in the middle of their import badly: until they are there Ctrl-C just ends.
+
+    Args:
+        module: full name.
+    """
+    interrupt = signal.getsignal(signal.SIGINT)
+    if interrupt is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        return importlib.import_module(module).run
+    finally:
+        if interrupt is signal.default_int_handler:
+            signal.signal(signal.SIGINT, interrupt)
 
 
 def number(expected: str, accepts: Callable[[float], bool]) -> Callable[[str], float]:

@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 from pathlib import Path
+from types import ModuleType
 
 from css_common import network, supervised
 
@@ -41,7 +42,7 @@ def main() -> int:
     return code
 
 
-def _module(executable: Path):
+def _module(executable: Path) -> ModuleType:
     package, name = executable.parent.name, executable.name
     for folder in ("nodes", "commands"):
         module = f"{package}.{folder}.{name}"

@@ -74,8 +74,9 @@ def create_executor(kind: str | None = None, context: Context | None = None) -> 
 
 
 def retire(executor: Executor, node: Node) -> None:
-    """Destroys a node and takes it out of its executor, its subscriptions first: with several writers of a topic the
-    executor does not see the true one.
+    """Destroys a node and takes it out of its executor.
+
+    Subscriptions go first: with several writers of a topic the executor does not see the true one.
     """
     stop_listening = getattr(node, "stop_listening", None)
     if stop_listening is not None:

@@ -12,6 +12,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -105,7 +106,11 @@ class ComponentNode(LifecycleNode):
         self.edges: dict[str, Edge] = {}
         self.matcher: Matcher = None  # type: ignore[assignment]
         self._table = component_type.table()
-        self._canonical = self._declare()
+        try:
+            self._canonical = self._declare()
+        except BaseException:
+            self.destroy_node()  # nobody else will: it is handed to nobody
+            raise
         self._output_ports: dict[str, tuple] = {}
         self.subscriptions_made: list[SoleSubscription] = []
         self.refused = ""
@@ -180,7 +185,7 @@ class ComponentNode(LifecycleNode):
         service = self._service_change_state
         inner = service.callback
 
-        def answer(request, response):
+        def answer(request, response) -> Any:
             try:
                 return inner(request, response)
             except Exception as error:

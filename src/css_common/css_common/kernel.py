@@ -11,13 +11,16 @@ import sys
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import llvmlite
 import numba
 
 from css_common import places
 from css_common.kernel_sources import hash_of, kernel_modules, sources_of
+
+P = ParamSpec("P")
+R = TypeVar("R", covariant=True)
 
 _COMPILER = f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__}"
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": False}
@@ -49,7 +52,18 @@ def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any
     return numba.njit(**options)(function)
 
 
-def kernel(function: Callable[..., Any]) -> Any:
+class Kernel(Protocol[P, R]):
+    """A compiled function."""
+
+    @property
+    def py_func(self) -> Callable[P, R]:
+        """The plain Python that it was made of."""
+
+    def __call__(self, *args: P.args, **kwargs: P.kwargs) -> R:
+        """Runs the compiled code, which is made at the first call with arguments of new types."""
+
+
+def kernel(function: Callable[P, R]) -> "Kernel[P, R]":
     """Compiles a pure function on scalars, tuples and small arrays; `kernel_function.py_func` is the plain Python.
 
     Arrays that go in are not counted as references: counting costs as much as the arithmetic of a whole control
@@ -75,7 +89,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     return dispatcher
 
 
-def outer_kernel(function: Callable[..., Any]) -> Any:
+def outer_kernel(function: Callable[P, R]) -> "Kernel[P, R]":
     """Compiles an outermost loop of a study: it may make and return arrays, and other threads go on meanwhile.
 
     Which kernels it calls may follow from the types of its arguments: it is compiled anew with any of them.
@@ -90,12 +104,12 @@ def _holds_array(numba_type: Any) -> bool:
     return isinstance(numba_type, (numba.types.Array, numba.types.Record))
 
 
-def typed_call(function: Callable[..., Any]) -> Callable[..., Any]:
+def typed_call(function: Callable[P, R]) -> Callable[P, R]:
     """A kernel bound to the argument types of its first call.
 
     Numba looks the types of all arguments up at every call from Python, which for nested parameters takes several
     times as long as the kernel itself. A component calls its kernels with the same types for ever and need not ask
-    again. The types must really never change: they are not checked any more.
+    again. The types must really never change: they are not checked any more. Arguments go by position.
     """
     entry: Callable[..., Any] | None = None
 
@@ -103,7 +117,7 @@ def typed_call(function: Callable[..., Any]) -> Callable[..., Any]:
         nonlocal entry
         if entry is not None:
             return entry(*arguments)
-        result = function(*arguments)
+        result = function(*arguments)  # type: ignore[call-arg]  # as many as the caller was held to
         overloads = getattr(function, "overloads", None)  # none when compilation is switched off for debugging
         if overloads is not None:
             entry = overloads[tuple(map(numba.typeof, arguments))].entry_point
@@ -111,4 +125,4 @@ def typed_call(function: Callable[..., Any]) -> Callable[..., Any]:
             entry = function
         return result
 
-    return call
+    return cast("Callable[P, R]", call)

@@ -65,7 +65,7 @@ _SHIFT = np.uint64(32)
 
 
 @kernel
-def philox4x32(c0, c1, c2, c3, k0, k1):
+def philox4x32(c0, c1, c2, c3, k0, k1) -> tuple[int, int, int, int]:
     """Ten rounds of Philox4x32: four uint32 words of counter and two of key in, four uint32 words out."""
     c0, c1, c2, c3 = numba.uint32(c0), numba.uint32(c1), numba.uint32(c2), numba.uint32(c3)
     k0, k1 = numba.uint32(k0), numba.uint32(k1)
@@ -87,7 +87,7 @@ _TO_UNIT = 2.0**-32
 
 
 @kernel
-def uniform4(key: RandomKey, stream: int, step: int, index: int):
+def uniform4(key: RandomKey, stream: int, step: int, index: int) -> tuple[float, float, float, float]:
     """Four numbers in the open interval (0, 1), 32 bits each."""
     r0, r1, r2, r3 = philox4x32(key.case, stream, step, index, key.seed_low, key.seed_high)
     return (
@@ -149,7 +149,7 @@ def normal_quantile(p: float) -> float:
 
 
 @kernel
-def normal4(key: RandomKey, stream: int, step: int, index: int):
+def normal4(key: RandomKey, stream: int, step: int, index: int) -> tuple[float, float, float, float]:
     """Four independent standard normal numbers."""
     u0, u1, u2, u3 = uniform4(key, stream, step, index)
     return (normal_quantile(u0), normal_quantile(u1), normal_quantile(u2), normal_quantile(u3))

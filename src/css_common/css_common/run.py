@@ -9,7 +9,7 @@ from css_common.mission import find_component
 
 
 def node_main(component_type: type[Component]) -> Callable[[], int]:
-    """The `main` of a node file: `main = node_main(Gyro)`."""
+    """What a node file calls its `main`."""
 
     def main(args: list[str] | None = None) -> int:
         from css_common import node_process

@@ -34,8 +34,9 @@ class Writer(NamedTuple):
 
 
 def local_processes() -> frozenset[int]:
-    """Low 16 bits of the numbers of the processes that run on this machine; one that has ended and is not yet
-    reaped does not run.
+    """Low 16 bits of the numbers of the processes that run on this machine.
+
+    One that has ended and is not yet reaped does not run.
     """
     return frozenset(int(name) & 0xFFFF for name in os.listdir("/proc") if name.isdigit() and _runs(name))
 

@@ -211,7 +211,7 @@ def test_three_processes_fly_a_mission(start, bench, mission_file, tmp_path):
     arguments = ("--ros-args", "--params-file", mission_file)
     partners = [start(name, *arguments) for name in ("estimator", "controller")]
     plant = start("source", "--summary", str(tmp_path / "summary.json"), *arguments)
-    bench.until(lambda: plant.popen.poll() is not None, "the plant ends by itself", seconds=2 * DEADLINE)
+    bench.until(lambda: plant.popen.poll() is not None, "the plant ends by itself")
     code, _, err = plant.end()
     assert code == 0, err
     summary = json.loads((tmp_path / "summary.json").read_text())

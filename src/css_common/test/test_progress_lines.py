@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 from css_common import progress_lines
 from css_common.progress_lines import ProgressLines, still_working
+from css_common.testing import DEADLINE
 
 
 def test_a_line_every_ten_seconds(capsys):
@@ -31,7 +32,7 @@ def test_what_takes_long_says_so_until_it_ends(capsys, monkeypatch):
     say = progress_lines._say
     monkeypatch.setattr(progress_lines, "_say", lambda line: (say(line), told.release()))
     with still_working("replaying bags/a"):
-        assert told.acquire(timeout=30.0)
+        assert told.acquire(timeout=DEADLINE)
     lines = capsys.readouterr().err.splitlines()
     assert lines and all(re.fullmatch(r"replaying bags/a: \d+ s of wall time so far", line) for line in lines)
     assert all(thread.name != "progress" for thread in threading.enumerate())

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import erfa
 import numpy as np
-from scipy.optimize import brentq
 
 from css_environment.constants import EARTH_MU, EARTH_ROTATION_RATE
 from css_environment.earth_rotation import dcm_en_at
@@ -74,6 +73,8 @@ def ballistic_arc(launch: Launch, epoch_ns: int) -> KeplerianOrbit:
         return float(geodetic_heights(epoch_ns, np.array([time]), position)[0]) - launch.apogee
 
     try:
+        from scipy.optimize import brentq  # half a second to load, for the few that fly a ballistic arc
+
         speed = brentq(excess, 1.0, _FASTEST, xtol=1e-9)
     except ValueError as error:
         raise ValueError(f"no arc in this direction has its apogee at {launch.apogee:g} m") from error

@@ -85,7 +85,7 @@ def secular_rates(orbit: KeplerianOrbit) -> tuple[float, float, float]:
     return mean_motion, -2.0 * factor * cos_i, factor * (5.0 * cos_i**2 - 1.0)
 
 
-def _keplerian_states(orbit: KeplerianOrbit, t: np.ndarray):
+def _keplerian_states(orbit: KeplerianOrbit, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The velocity is the exact derivative of the drifting position."""
     a, e = orbit.semi_major_axis, orbit.eccentricity
     mean_motion, raan_rate, perigee_rate = secular_rates(orbit)
@@ -125,7 +125,7 @@ def eccentric_anomaly(mean_anomaly, eccentricity: float) -> np.ndarray:
     return anomaly + turns
 
 
-def _tle_states(orbit: TleOrbit, epoch_ns: int, t: np.ndarray):
+def _tle_states(orbit: TleOrbit, epoch_ns: int, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     from sgp4.api import SGP4_ERRORS, Satrec  # here: most missions give elements and need no SGP4
 
     satellite = Satrec.twoline2rv(orbit.line1, orbit.line2)

@@ -8,6 +8,7 @@ announced yet have those known: ERFA's warning about them is not passed on, for 
 """
 
 import warnings
+from typing import Any
 
 import erfa
 import numpy as np
@@ -16,14 +17,14 @@ UNIX_EPOCH_JD = 2_440_587.5
 NANOSECONDS_PER_DAY = 86_400 * 10**9
 
 
-def utc_date(epoch_ns: int, elapsed_s=0.0):
+def utc_date(epoch_ns: int, elapsed_s=0.0) -> tuple[float, Any]:
     """UTC (and UT1) as (whole days, fraction) of a Julian date; `elapsed_s` [s] is a float or an array."""
     days, rest_ns = divmod(int(epoch_ns), NANOSECONDS_PER_DAY)
     fraction = rest_ns / NANOSECONDS_PER_DAY + np.asarray(elapsed_s, dtype=float) / 86_400.0
     return UNIX_EPOCH_JD + days, fraction
 
 
-def terrestrial_date(epoch_ns: int, elapsed_s=0.0):
+def terrestrial_date(epoch_ns: int, elapsed_s=0.0) -> tuple[float, Any]:
     """Terrestrial time (taken for TDB too: they differ by 2 ms at most) as (whole days, fraction)."""
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*dubious year", erfa.ErfaWarning)

@@ -11,12 +11,21 @@ from css_environment.albedo import Screen, albedo_output, collar_screen, new_wor
 from css_environment.constants import EARTH_RADIUS
 from css_environment.earth_light import (
     DISC,
+    DISC_COS,
     DISC_LIGHT,
+    DISC_SIN,
+    LIGHT,
+    PATCHES,
+    SIZE,
+    X,
+    Y,
+    Z,
     albedo_sources,
     gather_light,
     look_at_earth,
     new_earth_view,
     new_light,
+    write_patch,
 )
 from css_environment.ephemeris import at, build_ephemeris
 from css_environment.orbit import keplerian_orbit, orbit_period
@@ -192,3 +201,72 @@ def test_largest_output_along_the_papers_orbits(inclination, half_view, plane, e
             albedo_output(light, cells, screen, cos_half_view, dcm_bn, work, result)
             peak = max(peak, result.max())
     assert peak == pytest.approx(expected, abs=0.004)
+
+
+def square_of_light(half_width):
+    """Light of one evenly bright square about -z, its sides along x and y, from its closed-form first moment."""
+    light = new_light()
+    for patch in range(PATCHES):
+        write_patch(0.0, (0.0, 0.0, 0.0), patch, light)
+    # directions (u, v, -sqrt(1 - u^2 - v^2)) of a small square: the mean of the third part is 1 - h^2 / 3
+    write_patch(0.2, (0.0, 0.0, -0.2 * (1.0 - half_width**2 / 3.0)), 0, light)
+    light[DISC : DISC + 3] = 0.0, 0.0, -1.0
+    light[DISC + DISC_COS], light[DISC + DISC_SIN], light[DISC + DISC_LIGHT] = math.cos(1.2), math.sin(1.2), 0.2
+    return light
+
+
+@pytest.mark.parametrize("half_width", [0.02, 0.1, 0.2])
+def test_size_of_a_patch_is_half_the_width_of_an_evenly_bright_square(half_width):
+    light = square_of_light(half_width)
+    assert light[SIZE] == pytest.approx(half_width, rel=half_width**2 + 1e-4)
+    assert 4.0 * light[SIZE] * light[LIGHT] == pytest.approx(0.2, rel=1e-6)
+    assert (light[X], light[Y]) == (0.0, 0.0) and light[Z] == pytest.approx(-1.0 + half_width**2 / 3.0, rel=1e-6)
+
+
+def test_light_from_a_single_direction_is_as_wide_as_the_smallest_patch():
+    """Half a degree: an edge of a cone that passes over it dims it gently."""
+    light = square_of_light(0.0)
+    assert light[SIZE] == pytest.approx(0.01)
+    edge = math.radians(60.0)
+    for inside, part in ((-1.05, 0.0), (-0.5, 0.25), (0.5, 0.75), (1.05, 1.0)):
+        angle = edge - 0.01 * inside
+        value = output(light, [[math.sin(angle), 0.0, -math.cos(angle)]], cos_half_view=0.5)[0]
+        assert value == pytest.approx(0.2 * 0.5 * part, rel=0.02, abs=1e-9)
+
+
+def test_patches_fill_the_disc_of_the_earth():
+    """Seen whole and evenly lit, squares of the patches' sizes cover the solid angle that the Earth fills."""
+    r = EARTH_RADIUS + 400e3
+    light = light_from((0.0, 0.0, r), (0.0, 0.0, 1.0))
+    sizes = light[SIZE : SIZE + PATCHES].astype(float)
+    disc = 2.0 * math.pi * (1.0 - math.sqrt(1.0 - (EARTH_RADIUS / r) ** 2))
+    # patches are sectors of rings, brighter toward one side, and longer than wide at the limb
+    assert np.sum(4.0 * sizes**2) == pytest.approx(disc, rel=0.15)
+
+
+@pytest.mark.parametrize("half_width", [0.05, 0.1])
+@pytest.mark.parametrize("inside", [-1.1, -0.5, 0.0, 0.5, 1.1])
+def test_cone_of_view_cuts_a_patch_as_wide_as_it_is(inside, half_width):
+    """Against the integral over the square; the edge of the cone is `inside` half widths beyond its middle."""
+    angle = math.radians(60.0) - inside * half_width
+    normal = [math.sin(angle), 0.0, -math.cos(angle)]
+    u, v = (w.ravel() for w in np.meshgrid(*2 * [half_width * (np.arange(400) + 0.5 - 200.0) / 200.0]))
+    cosine = u * normal[0] - np.sqrt(1.0 - u * u - v * v) * normal[2]
+    expected = 0.2 * np.mean(np.where(cosine > 0.5, cosine, 0.0))
+    value = output(square_of_light(half_width), [normal], cos_half_view=0.5)[0]
+    # the cone's edge is bent: over the square it lies a twelfth of the half width, of 0.1 of light, off a straight one
+    assert value == pytest.approx(expected, abs=0.1 * half_width / 12.0 * 1.1)
+    assert (value > 0.0) == (inside > -1.0)
+
+
+@pytest.mark.parametrize("inside", [-1.05, -0.5, 0.0, 0.5, 1.05])
+def test_plane_cuts_a_patch_in_proportion_to_its_width(inside):
+    """A plane whose edge stands `inside` half widths from the middle of the patch; each side has its part."""
+    half_width = 0.08
+    light = square_of_light(half_width)
+    tilt = inside * half_width
+    screen = plane_screen((math.cos(tilt), 0.0, -math.sin(tilt)))
+    part = min(max(0.5 + 0.5 * inside, 0.0), 1.0)
+    for side, expected in ((1.0, part), (-1.0, 1.0 - part)):
+        value = output(light, [[0.0, 0.0, -1.0]], side, screen)[0]
+        assert value == pytest.approx(0.2 * expected, abs=0.2 * half_width**2)

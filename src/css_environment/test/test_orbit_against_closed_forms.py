@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 from sgp4.api import Satrec, jday
 
-from css_environment.constants import EARTH_MU
+from css_environment.constants import EARTH_J2, EARTH_MU, EARTH_RADIUS
 from css_environment.orbit import (
     TleOrbit,
     dcm_n_teme,
@@ -78,6 +80,75 @@ def test_node_drifts_with_the_sun_on_the_clark_orbit():
 def test_perigee_stands_still_at_the_critical_inclination():
     critical = math.degrees(math.acos(math.sqrt(0.2)))
     assert secular_rates(keplerian_orbit(2.6e7, 0.7, critical, j2_drift=True))[2] == pytest.approx(0.0, abs=1e-18)
+
+
+def elements_over_anomaly(orbit, turns, samples):
+    """Osculating elements under the force of J2, at steps of the mean anomaly so small that their means are exact.
+
+    Rows: time, semi-major axis, eccentricity, inclination, node, argument of perigee, mean anomaly, the last three
+    without jumps.
+    """
+
+    def force(_, x):
+        r = x[:3]
+        distance = np.linalg.norm(r)
+        k = 1.5 * EARTH_J2 * EARTH_MU * EARTH_RADIUS**2 / distance**5
+        z = 5.0 * (r[2] / distance) ** 2
+        return np.concatenate((x[3:], -EARTH_MU / distance**3 * r + k * r * (z - np.array([1.0, 1.0, 3.0]))))
+
+    r, v = orbit_states(orbit, EPOCH_2013, 0.0)
+    span = turns * orbit_period(orbit)
+    t = np.linspace(0.0, span, turns * samples)
+    flown = solve_ivp(force, (0.0, span), np.concatenate((r[0], v[0])), "DOP853", t, rtol=1e-11, atol=1e-6).y
+    r, v = flown[:3].T, flown[3:].T
+    distance = np.linalg.norm(r, axis=1)
+    a = 1.0 / (2.0 / distance - np.sum(v * v, 1) / EARTH_MU)
+    h = np.cross(r, v)
+    perigee = np.cross(v, h) / EARTH_MU - r / distance[:, None]
+    e = np.linalg.norm(perigee, axis=1)
+    node = np.stack((-h[:, 1], h[:, 0], np.zeros_like(t)), 1) / np.hypot(h[:, 0], h[:, 1])[:, None]
+    across = np.cross(h / np.linalg.norm(h, axis=1)[:, None], node)
+    argument = np.arctan2(np.sum(perigee * across, 1), np.sum(perigee * node, 1))
+    eccentric = np.arctan2(np.sum(r * v, 1) / np.sqrt(EARTH_MU * a), 1.0 - distance / a)
+    mean_anomaly = eccentric - e * np.sin(eccentric)
+    angles = (np.unwrap(x) for x in (np.arctan2(h[:, 0], -h[:, 1]), argument, mean_anomaly))
+    return np.array((t, a, e, np.arccos(h[:, 2] / np.linalg.norm(h, axis=1)), *angles))
+
+
+@pytest.mark.parametrize("inclination", [20.0, 50.0, 97.3])
+def test_secular_rates_are_those_of_the_motion_under_j2(inclination):
+    """Node, perigee and mean anomaly drift as the integrated motion does, whose mean elements the theory is about."""
+    turns, samples = 40, 400
+    start = keplerian_orbit(8.0e6, 0.1, inclination, 60.0, 30.0, 10.0, j2_drift=True)
+    t, a, e, i, *angles = elements_over_anomaly(start, turns, samples)
+    # means over whole turns of the mean anomaly, in which the short-period terms cancel
+    anomaly = angles[2]
+    even = np.arange(anomaly[0], anomaly[-1], 2.0 * np.pi / samples)
+    even = even[: len(even) // samples * samples]
+
+    def over_turns(values):
+        return np.interp(even, anomaly, values).reshape(-1, samples).mean(1)
+
+    mean_a, mean_e, mean_i = (float(over_turns(x).mean()) for x in (a, e, i))
+    times = over_turns(t)
+    measured = [float(np.polyfit(times, over_turns(x), 1)[0]) for x in (angles[2], angles[0], angles[1])]
+    mean = start._replace(semi_major_axis=mean_a, eccentricity=mean_e, inclination=mean_i)
+    free = secular_rates(mean._replace(j2=0.0))
+    size = 0.75 * free[0] * EARTH_J2 * (EARTH_RADIUS / (mean_a * (1.0 - mean_e**2))) ** 2
+    # what the first order in J2 leaves out is of its second order
+    np.testing.assert_allclose(np.subtract(measured, secular_rates(mean)) / size, 0.0, atol=0.02)
+
+
+def test_positions_drift_with_the_secular_rates():
+    """After whole anomalistic periods the spacecraft is at the perigee, which has turned with node and argument."""
+    orbit = keplerian_orbit(8.0e6, 0.1, 50.0, 60.0, 30.0, 0.0, j2_drift=True)
+    mean_motion, raan_rate, perigee_rate = secular_rates(orbit)
+    t = 25.0 * 2.0 * math.pi / mean_motion
+    r, _ = orbit_states(orbit, EPOCH_2013, t)
+    turn = Rotation.from_euler("ZXZ", [math.radians(60.0) + raan_rate * t, math.radians(50.0), 0.0])
+    argument = math.radians(30.0) + perigee_rate * t
+    expected = 8.0e6 * 0.9 * turn.apply([math.cos(argument), math.sin(argument), 0.0])
+    np.testing.assert_allclose(r[0], expected, atol=1e-3)
 
 
 @pytest.mark.parametrize("j2_drift", [False, True])

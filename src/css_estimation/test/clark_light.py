@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from css_common.mission_extends import sections_of_file
+from css_common.mission import load_mission
 from css_common.schema import default_values
 from css_common.sections import CELLS, SPACECRAFT
 from css_estimation.sun import flat_cells, pyramid_switch
@@ -17,8 +17,8 @@ SHARED = CELLS + SPACECRAFT
 
 def layout(name):
     """Normals (14, 3) and array normal of a mission file."""
-    shared = sections_of_file(CONFIG / f"{name}.yaml")["/**"]
-    return np.reshape(shared["cells.normals"], (-1, 3)), np.array(shared["spacecraft.array_normal"])
+    values = load_mission(CONFIG / f"{name}.yaml").values
+    return values.cells.normals, values.spacecraft.array_normal
 
 
 FLAT_NORMALS, PANEL = layout("clark_1996_flat")

@@ -17,10 +17,15 @@ from css_estimation.attitude.field_direction import field_measurement
 from css_estimation.attitude.lit_sun_vector import lit_sun, sun_vector_measurement
 from css_estimation.sun.cell_calibration import SCALE, TILT_1, TILT_2, nominal
 
-rng = np.random.default_rng(5)
 FACES = [1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0]
 TABLE = CELLS + attitude_options.PARAMETERS + flight_references.PARAMETERS
 STEP = 1e-6
+
+
+@pytest.fixture
+def rng():
+    """Numbers of this test alone: they do not depend on which others run."""
+    return np.random.default_rng(5)
 
 
 def parameters(**changes):
@@ -30,7 +35,7 @@ def parameters(**changes):
     return attitude_options.parameters(okeefe_values(TABLE, **changes))
 
 
-def direction():
+def direction(rng):
     v = rng.normal(size=3)
     return tuple((v / np.linalg.norm(v)).tolist())
 
@@ -47,8 +52,8 @@ def gradient(function, v):
     return np.array([(function(turned(a, STEP, v)) - function(turned(a, -STEP, v))) / (2.0 * STEP) for a in range(3)])
 
 
-def test_field():
-    field_b = tuple(3e-5 * c for c in direction())
+def test_field(rng):
+    field_b = tuple(3e-5 * c for c in direction(rng))
     m = field_measurement(field_b, field_b, (200e-9) ** 2)
     assert m.dof == 2 and m.residual == (0.0, 0.0, 0.0)
     assert m.variance == pytest.approx((200e-9 / 3e-5) ** 2)
@@ -66,12 +71,12 @@ def test_what_is_no_field_gives_no_measurement(bad):
     assert field_measurement((3e-5, 0.0, 0.0), bad, 1e-14).dof == 0
 
 
-def test_sun_vector_is_the_least_squares_solution_with_its_covariance():
-    p = parameters(cells__normals=[c for _ in range(5) for c in direction()])
+def test_sun_vector_is_the_least_squares_solution_with_its_covariance(rng):
+    p = parameters(cells__normals=[c for _ in range(5) for c in direction(rng)])
     cells = p.cells.layout.cells
     n = np.stack([cells["nx"], cells["ny"], cells["nz"]], axis=1)
     outputs = np.abs(rng.normal(size=5)) + 0.2
-    predicted_b = direction()
+    predicted_b = direction(rng)
     sun = lit_sun(cells, outputs, 0b11111, int(np.argmax(outputs)))
     np.testing.assert_allclose(sun.vector, np.linalg.lstsq(n, outputs, rcond=None)[0], atol=1e-12)
     m = sun_vector_measurement(sun, predicted_b, 0.02**2)
@@ -95,11 +100,11 @@ def test_normals_that_do_not_span_space_give_no_sun_vector(mask, rank):
 
 
 @pytest.mark.parametrize("used", ["lit_or_expected", "lit"])
-def test_voltage_partials(used):
+def test_voltage_partials(rng, used):
     p = parameters(
-        cells_used=used, calibration__mode="estimate", calibration__alignment=True, cells__normals=[*direction()] * 3
+        cells_used=used, calibration__mode="estimate", calibration__alignment=True, cells__normals=[*direction(rng)] * 3
     ).cells
-    sun_b, intensity, albedo = direction(), 0.97, 0.1
+    sun_b, intensity, albedo = direction(rng), 0.97, 0.1
     if np.dot([p.layout.cells[1][n] for n in ("nx", "ny", "nz")], sun_b) < 0.0:
         sun_b = tuple(-c for c in sun_b)
     calibration = nominal(3)

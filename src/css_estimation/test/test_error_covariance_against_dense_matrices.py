@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_estimation.sun.error_covariance import (
@@ -23,10 +24,14 @@ from css_estimation.sun.error_covariance import (
 )
 from css_estimation.symmetric import inverse_form
 
-rng = np.random.default_rng(20130601)
+
+@pytest.fixture
+def rng():
+    """Numbers of this test alone: they do not depend on which others run."""
+    return np.random.default_rng(20130601)
 
 
-def random_covariance(n):
+def random_covariance(rng, n):
     a = rng.normal(size=(n, n)) * 0.1
     return a @ a.T + 1e-4 * np.eye(n)
 
@@ -35,9 +40,9 @@ def skew(w):
     return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
 
 
-def test_propagation_is_the_solution_of_the_lyapunov_equation():
+def test_propagation_is_the_solution_of_the_lyapunov_equation(rng):
     omega, dt, sv2, su2 = np.array([0.002, -0.003, 0.001]), 0.1, 1e-6, 1e-10
-    p = random_covariance(6)
+    p = random_covariance(rng, 6)
     f = np.block([[-skew(omega), -np.eye(3)], [np.zeros((3, 6))]])
     q = np.diag([sv2] * 3 + [su2] * 3)
 
@@ -51,8 +56,31 @@ def test_propagation_is_the_solution_of_the_lyapunov_equation():
     np.testing.assert_array_equal(p, p.T)
 
 
-def test_without_gyro_the_bias_turns_nothing():
-    p = random_covariance(9)
+@pytest.mark.parametrize("dt", [0.1, 2.0])
+def test_noise_alone_is_van_loans_integral(dt):
+    """Of a body at rest the discrete noise is exact: every block of it, from the walk of the bias alone too."""
+    f = np.block([[np.zeros((3, 3)), -np.eye(3)], [np.zeros((3, 6))]])
+    identity = tuple(map(tuple, np.eye(3).tolist()))
+    for sv2, su2 in ((0.0, 1e-3), (1e-2, 0.0), (3e-3, 2e-3)):
+        q = np.diag([sv2] * 3 + [su2] * 3)
+        exponential = expm(dt * np.block([[-f, q], [np.zeros((6, 6)), f.T]]))
+        p = np.zeros((6, 6))
+        propagate(p, identity, dt, sv2, su2, True)
+        np.testing.assert_allclose(p, exponential[6:, 6:].T @ exponential[:6, 6:], rtol=1e-12, atol=1e-18)
+
+
+def test_an_error_of_the_bias_turns_the_attitude(rng):
+    p = random_covariance(rng, 9)
+    turn, dt = np.array(rotation_vector_to_dcm((0.1, 0.2, -0.1))), 2.0
+    phi = np.eye(9)
+    phi[:3, :3], phi[:3, 3:6] = turn, -dt * np.eye(3)
+    expected = phi @ p @ phi.T
+    propagate(p, tuple(map(tuple, turn.tolist())), dt, 0.0, 0.0, True)
+    np.testing.assert_allclose(p, expected, rtol=1e-12, atol=1e-15)
+
+
+def test_without_gyro_the_bias_turns_nothing(rng):
+    p = random_covariance(rng, 9)
     before = p.copy()
     turn = np.array(rotation_vector_to_dcm((0.1, 0.2, -0.1)))
     propagate(p, tuple(map(tuple, turn)), 2.0, 1e-3, 1e-8, False)
@@ -61,7 +89,7 @@ def test_without_gyro_the_bias_turns_nothing():
     np.testing.assert_allclose(p[3:, 3:], before[3:, 3:] + np.diag([2e-8] * 3 + [0.0] * 3), atol=1e-15)
 
 
-def numbers(n, count):
+def numbers(rng, n, count):
     """Random measurements of attitude, and of the calibration of cells with three errors each."""
     cells = (n - 6) // 3
     rows, partials = np.zeros((count, n)), []
@@ -76,9 +104,9 @@ def numbers(n, count):
 
 
 @pytest.mark.parametrize("n", [6, 12])
-def test_numbers_in_sequence_are_the_stacked_joseph_update(n):
-    p = random_covariance(n)
-    rows, partials = numbers(n, 5)
+def test_numbers_in_sequence_are_the_stacked_joseph_update(rng, n):
+    p = random_covariance(rng, n)
+    rows, partials = numbers(rng, n, 5)
     residuals, r = rng.normal(size=5), 0.01
     s = rows @ p @ rows.T + r * np.eye(5)
     k = p @ rows.T @ np.linalg.inv(s)
@@ -96,11 +124,11 @@ def test_numbers_in_sequence_are_the_stacked_joseph_update(n):
     assert total == pytest.approx(nis, rel=1e-9)
 
 
-def test_considered_errors_keep_their_covariance_and_count_as_errors():
+def test_considered_errors_keep_their_covariance_and_count_as_errors(rng):
     """K = (P_xx H_x^T + P_xc H_c^T) S^-1 with S of all errors; the considered ones are not corrected."""
-    p = random_covariance(12)
+    p = random_covariance(rng, 12)
     before = p.copy()
-    rows, (h,) = numbers(12, 1)
+    rows, (h,) = numbers(rng, 12, 1)
     row, residual, r = rows[0], 0.7, 0.01
     s = row @ before @ row + r
     k = before @ row / s
@@ -115,8 +143,8 @@ def test_considered_errors_keep_their_covariance_and_count_as_errors():
     np.testing.assert_allclose(work[CORRECTION], k * residual, atol=1e-15)
 
 
-def test_a_bound_scales_errors_and_keeps_correlations():
-    p = random_covariance(6)
+def test_a_bound_scales_errors_and_keeps_correlations(rng):
+    p = random_covariance(rng, 6)
     before = p.copy()
     largest = np.diag(p) * np.array([1.0, 0.1, 2.0, 0.5, 1.0, 1e-3])
     bound(p, largest)
@@ -128,8 +156,8 @@ def test_a_bound_scales_errors_and_keeps_correlations():
     np.testing.assert_allclose(correlation(p), correlation(before), atol=1e-12)
 
 
-def test_a_block_that_is_set_has_nothing_to_do_with_the_rest():
-    p = random_covariance(9)
+def test_a_block_that_is_set_has_nothing_to_do_with_the_rest(rng):
+    p = random_covariance(rng, 9)
     before = p.copy()
     block = (2.0, 0.1, 0.2, 3.0, 0.3, 4.0)
     set_block(p, 3, block)
@@ -139,16 +167,16 @@ def test_a_block_that_is_set_has_nothing_to_do_with_the_rest():
     np.testing.assert_array_equal(p[6:, 6:], before[6:, 6:])
 
 
-def test_inverse_form_against_numpy():
+def test_inverse_form_against_numpy(rng):
     for _ in range(50):
-        m, v = random_covariance(3), rng.normal(size=3)
+        m, v = random_covariance(rng, 3), rng.normal(size=3)
         packed = attitude_block(m)
         assert inverse_form(packed, tuple(v.tolist())) == pytest.approx(v @ np.linalg.solve(m, v), rel=1e-9)
     for bad in ((0.0,) * 6, (1.0, 2.0, 0.0, 1.0, 0.0, 1.0), (1.0, 0.0, 2.0, 1.0, 0.0, 1.0), (math.nan,) * 6):
         assert inverse_form(bad, (1.0, 1.0, 1.0)) == math.inf
 
 
-def test_the_neglected_variance_lies_between_those_across_and_along_a_direction():
+def test_the_neglected_variance_lies_between_those_across_and_along_a_direction(rng):
     sigma = 0.3
     turns = sigma * rng.normal(size=(200_000, 3))
     s = np.array([0.0, 0.0, 1.0])

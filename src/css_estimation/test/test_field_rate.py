@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.vectors import cross, dot, multiply, scale, subtract
-from css_estimation.sun.field_rate import FieldChange, rate_about_sun
+from css_estimation.sun.field_rate import FieldChange, FieldTrack, rate_about_sun, track_field
+from css_estimation.sun.field_rate import initial_state as field_state
 from css_estimation.sun.sun_heading import (
     PREDICTION_ECLIPSED,
     PREDICTION_SUNLIT,
@@ -55,6 +56,43 @@ def test_rate_about_the_sun_line(sun, field, rate, dt):
         assert measured == pytest.approx(about, abs=(np.linalg.norm(omega) * dt) ** 2 * np.linalg.norm(omega) + 1e-12)
     else:
         assert measured == 0.0
+
+
+def test_error_of_the_rate_falls_with_the_square_of_the_interval():
+    """The field in the middle of two measurements makes it of second order; that of either end would be of first."""
+    omega, sun_b, field_b = (0.05, -0.03, 0.04), unit((0.3, -0.5, -0.8)), scale(FIELD_T, unit((0.2, 1.0, -0.3)))
+    about = dot(omega, sun_b)
+    across_b = subtract(omega, scale(about, sun_b))
+    errors = []
+    for dt in (2.0, 1.0, 0.5):
+        change = FieldChange(True, turned(field_b, omega, 0.5 * dt), turned(field_b, omega, -0.5 * dt), dt)
+        errors.append(rate_about_sun(sun_b, across_b, change, SMALLEST_SINE)[0] - about)
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.01)
+
+
+@pytest.mark.parametrize("hold", [2.0, 10.0])
+def test_the_field_is_followed_from_measurement_to_measurement(hold):
+    """Which two make a pair, how far apart they are, and how old the rate from them has become."""
+    p = build(SWITCH, rate__use_field=True, rate__field_hold=hold)[0].tracking.field
+    earlier, later = scale(FIELD_T, unit((0.2, 1.0, -0.3))), scale(FIELD_T, unit((0.25, 1.0, -0.3)))
+    track, change = track_field(p, field_state(), 0.5, measured(earlier))
+    assert not change.known and track == FieldTrack(earlier, 0.0, -1.0)
+    track, change = track_field(p, track, 0.5, UNAIDED)
+    assert not change.known and track == FieldTrack(earlier, 0.5, -1.0)
+    track, change = track_field(p, track._replace(age=0.25), 1.0, measured(later))
+    assert change == FieldChange(True, later, earlier, 1.5)
+    assert track == FieldTrack(later, 0.0, 1.25)
+    # as long as it is held both are good, and not a cycle longer
+    waited = track_field(p, track._replace(age=0.0), hold, UNAIDED)[0]
+    assert waited == FieldTrack(later, hold, hold)
+    assert track_field(p, track, hold, measured(earlier))[1].known
+    over = track_field(p, track._replace(age=0.0), hold + 0.5, UNAIDED)[0]
+    assert over == FieldTrack(later, -1.0, -1.0)
+    assert not track_field(p, track, hold + 0.5, measured(earlier))[1].known
+
+
+def measured(field_b):
+    return UNAIDED._replace(field_b=field_b, field_valid=True)
 
 
 class Flight:

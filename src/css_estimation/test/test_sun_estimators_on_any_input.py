@@ -2,52 +2,85 @@
 """Whatever comes in, what goes out is finite, and the heading is a unit vector or none."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from listing import components, executable, settings_of
 from okeefe_spacecraft import okeefe_values
 
-from css_common.sections import CELLS
-from css_estimation.sun import least_squares, sunline_ekf, wavg
-from css_estimation.sun.sun_heading import UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
+from css_estimation.sun.sun_estimator import SunEstimator
+from css_estimation.sun.sun_heading import PREDICTION_SUNLIT, UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
 
-ESTIMATORS = pytest.mark.parametrize(
-    ("estimator", "options"),
-    [(wavg, {}), (least_squares, {}), (least_squares, {"use_dark_cells": True}), (sunline_ekf, {})],
-    ids=["wavg", "wls", "wls with dark cells", "ekf"],
-)
+KINDS = components(base=SunEstimator)
 TURNING = UNAIDED._replace(gyro_b=(0.0, 0.0, 0.01), gyro_valid=True)
-rng = np.random.default_rng(7)
+SUN_B = (0.0, 0.6, 0.8)
 
 
-def normals(count):
-    n = rng.normal(size=(count, 3))
+def variants():
+    """Every estimator as it is by default, and with each of its flags and choices in each other way."""
+    for kind in KINDS:
+        yield pytest.param(kind, {}, id=executable(kind))
+        for parameter in kind.parameters:
+            others = {"flag": (not parameter.default,), "choice": parameter.choices}.get(parameter.kind, ())
+            for other in others:
+                if other != parameter.default:
+                    changes = {parameter.name.replace(".", "__"): other}
+                    yield pytest.param(kind, changes, id=f"{executable(kind)} {parameter.name}={other}")
+
+
+def random_normals(count):
+    n = np.random.default_rng(count).normal(size=(count, 3))
     return (n / np.linalg.norm(n, axis=1, keepdims=True)).ravel().tolist()
 
 
-LAYOUTS = {count: normals(count) for count in (1, 2, 8, 32)}
+@cache
+def layouts(kind):
+    """Cells by their number: at random, or those of its mission where it takes no others."""
+    drawn = {count: {"cells__normals": random_normals(count)} for count in (1, 2, 8, 32)}
+    if any(kind.conflicts(okeefe_values(kind.table(), **layout)) for layout in drawn.values()):
+        layout = settings_of(kind, "cells", "spacecraft")
+        drawn = {len(layout["cells__normals"]) // 3: layout}
+    return {count: {"cells__clip_normal": [0.0, 0.0, 0.0]} | layout for count, layout in drawn.items()}
 
 
-def build(estimator, count, **changes):
-    changes.setdefault("cells__clip_normal", [0.0, 0.0, 0.0])
-    p = estimator.parameters(okeefe_values(CELLS + estimator.PARAMETERS, cells__normals=LAYOUTS[count], **changes))
-    return p, estimator.initial_state(p)
+ALL = list(variants())
+DEFAULTS = [variant for variant in ALL if not variant.values[1]]
+VARIANTS = pytest.mark.parametrize(("kind", "options"), ALL)
+BY_COUNT = pytest.mark.parametrize(
+    ("kind", "options", "count"),
+    [
+        pytest.param(*variant.values, count, id=f"{variant.id} of {count}")
+        for variant in ALL
+        for count in (layouts(variant.values[0]) if variant in DEFAULTS else [max(layouts(variant.values[0]))])
+    ],
+)
 
 
-def assert_sane(heading):
+def build(kind, count, **changes):
+    p = kind.algorithm.parameters(okeefe_values(kind.table(), **(layouts(kind)[count] | changes)))
+    return p, kind.algorithm.initial_state(p)
+
+
+def outputs_of(kind, count, sun_b):
+    normals = np.reshape(layouts(kind)[count]["cells__normals"], (-1, 3))
+    return np.maximum(normals @ sun_b, 0.0)
+
+
+def assert_sane(heading, largest_variance=4.0):
     numbers = (*heading.sun_b, *heading.covariance, *heading.omega_bn_b, heading.age, heading.nis)
     assert all(map(math.isfinite, numbers))
     length = math.sqrt(sum(c * c for c in heading.sun_b))
-    assert length == 0.0 if heading.validity == VALIDITY_NONE else abs(length - 1.0) < 1e-9
+    assert abs(length - 1.0) < 1e-9 or (length == 0.0 and heading.validity == VALIDITY_NONE)
     assert heading.age >= 0.0 and heading.nis >= 0.0
     assert heading.lit_mask.bit_count() >= heading.nis_dof
     if heading.covariance[0] != -1.0:
         p = np.array(heading.covariance).reshape(3, 3)
         assert np.array_equal(p, p.T)
         assert np.linalg.eigvalsh(p).min() > -1e-12
-        assert np.diag(p).max() <= 4.0 + 1e-9
+        assert np.diag(p).max() <= largest_variance + 1e-9
 
 
 outputs = st.one_of(
@@ -69,42 +102,61 @@ cycle = st.tuples(
 )
 
 
-@ESTIMATORS
-@settings(max_examples=150, deadline=None)
-@given(cycles=st.lists(cycle, min_size=1, max_size=12), count=st.sampled_from([1, 2, 8, 32]), use_field=st.booleans())
-def test_any_sequence(estimator, options, cycles, count, use_field):
-    p, state = build(estimator, count, eclipse__source="both", rate__use_field=use_field, **options)
+@VARIANTS
+@settings(max_examples=25, deadline=None)
+@given(cycles=st.lists(cycle, min_size=1, max_size=12), data=st.data())
+def test_any_sequence(kind, options, cycles, data):
+    count = data.draw(st.sampled_from(sorted(layouts(kind))), "cells")
+    drawn = {"eclipse__source": "both", "rate__use_field": data.draw(st.booleans(), "use_field")}
+    p, state = build(kind, count, **(drawn | options))
     for voltages, aiding, dt, predicted in cycles:
-        state, heading = estimator.step(p, state, dt, np.array(voltages[:count]), aiding, predicted)
+        state, heading = kind.algorithm.step(p, state, dt, np.array(voltages[:count]), aiding, predicted)
         assert_sane(heading)
 
 
-@ESTIMATORS
-@pytest.mark.parametrize("count", [1, 2, 8, 32])
+@pytest.mark.parametrize("kind", KINDS, ids=executable)
+@settings(max_examples=100, deadline=None)
+@given(cycles=st.lists(cycle, min_size=1, max_size=12), data=st.data())
+def test_any_sequence_with_parameters_at_the_ends_of_their_ranges(kind, cycles, data):
+    count = data.draw(st.sampled_from(sorted(layouts(kind))), "cells")
+    ends = {}
+    for parameter in kind.parameters:
+        if parameter.kind == "real":
+            low = None if parameter.open_low else parameter.low
+            known = [end for end in (parameter.default, low, parameter.high) if end is not None]
+            ends[parameter.name.replace(".", "__")] = st.sampled_from(known)
+    p, state = build(kind, count, **data.draw(st.fixed_dictionaries(ends), "parameters"))
+    for voltages, aiding, dt, predicted in cycles:
+        state, heading = kind.algorithm.step(p, state, dt, np.array(voltages[:count]), aiding, predicted)
+        assert_sane(heading, largest_variance=100.0)
+
+
+@BY_COUNT
 @pytest.mark.parametrize("level", [0.0, 1e-300, 0.5, 1.0, 1e30, 1e90, 1e200])
-def test_all_outputs_equal(estimator, options, count, level):
-    p, state = build(estimator, count, **options)
+def test_all_outputs_equal(kind, options, count, level):
+    p, state = build(kind, count, **options)
     for _ in range(50):
-        state, heading = estimator.step(p, state, 0.1, np.full(count, level), TURNING, -1)
+        state, heading = kind.algorithm.step(p, state, 0.1, np.full(count, level), TURNING, PREDICTION_SUNLIT)
         assert_sane(heading)
     assert (heading.validity == VALIDITY_VALID) == (0.5 <= level < 1e100)
 
 
-@ESTIMATORS
-def test_one_dead_reading_costs_one_cell(estimator, options):
+@VARIANTS
+def test_one_dead_reading_costs_one_cell(kind, options):
     """A NaN is a dark cell: the heading comes from the others."""
-    p, state = build(estimator, 8, **options)
-    voltages = np.maximum(np.array(LAYOUTS[8]).reshape(8, 3) @ (0.0, 0.6, 0.8), 0.0)
+    count = next(n for n in (8, *layouts(kind)) if n in layouts(kind))
+    p, state = build(kind, count, **options)
+    voltages = outputs_of(kind, count, SUN_B)
     voltages[np.argmin(voltages)] = math.nan
     for _ in range(100):
-        state, heading = estimator.step(p, state, 0.1, voltages, UNAIDED, -1)
+        state, heading = kind.algorithm.step(p, state, 0.1, voltages, UNAIDED, PREDICTION_SUNLIT)
     assert heading.validity == VALIDITY_VALID
     assert_sane(heading)
-    assert np.dot(heading.sun_b, (0.0, 0.6, 0.8)) > math.cos(math.radians(60.0))
+    assert np.dot(heading.sun_b, SUN_B) > math.cos(math.radians(60.0))
 
 
-@ESTIMATORS
-def test_32_cells_use_the_whole_mask(estimator, options):
-    p, state = build(estimator, 32, **options)
-    _, heading = estimator.step(p, state, 0.1, np.ones(32), UNAIDED, -1)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if 32 in layouts(kind)], ids=executable)
+def test_32_cells_use_the_whole_mask(kind):
+    p, state = build(kind, 32)
+    _, heading = kind.algorithm.step(p, state, 0.1, np.ones(32), UNAIDED, -1)
     assert heading.lit_mask == 2**32 - 1

@@ -36,13 +36,13 @@ class Flight:
         self.state = estimator.initial_state(self.p)
         self.sun_b = (0.0, 0.0, 1.0)
 
-    def step(self, lit=True, gyro=True, omega=OMEGA):
-        self.sun_b = multiply(rotation_vector_to_dcm(scale(DT, omega)), self.sun_b)
+    def step(self, lit=True, gyro=True, omega=OMEGA, dt=DT):
+        self.sun_b = multiply(rotation_vector_to_dcm(scale(dt, omega)), self.sun_b)
         cosines = NORMALS @ self.sun_b
         seen = (cosines >= 0.5 - 1e-12) & (NORMALS[:, 2] * self.sun_b[2] > 0.0)
         voltages = np.where(seen, cosines, 0.0) * lit
         aiding = UNAIDED._replace(gyro_b=omega, gyro_valid=gyro)
-        self.state, heading = self.estimator.step(self.p, self.state, DT, voltages, aiding, -1)
+        self.state, heading = self.estimator.step(self.p, self.state, dt, voltages, aiding, -1)
         return heading
 
     def fly(self, steps, **conditions):
@@ -68,6 +68,21 @@ def test_rate_sources(estimator):
     # the vector of before the darkness is no half of a pair
     assert flight.step(gyro=False).rate_source == RATE_NONE
     assert flight.step(gyro=False).rate_source == RATE_SUN
+
+
+def test_a_filter_that_starts_anew_makes_no_rate_of_its_old_and_its_new_vector():
+    """A silence so long that the covariance grew beyond use: both cycles are lit, and are no pair all the same."""
+    flight = Flight(sunline_ekf)
+    flight.fly(50, gyro=False)
+    continued, anew = (Flight(sunline_ekf) for _ in range(2))
+    for other in (continued, anew):
+        other.state, other.sun_b = flight.state, flight.sun_b
+    heading = continued.step(gyro=False, dt=100.0, omega=(1e-7, 0.0, 0.0))
+    assert (heading.mode, heading.rate_source) == (sunline_ekf.MODE_TRACKING, RATE_SUN)
+    heading = anew.step(gyro=False, dt=5e4, omega=(1e-7, 0.0, 0.0))
+    assert (heading.mode, heading.rate_source) == (sunline_ekf.MODE_STARTED, RATE_NONE)
+    assert heading.omega_bn_b == flight.state.tracking.omega_bn_b
+    assert anew.step(gyro=False).rate_source == RATE_SUN
 
 
 @ESTIMATORS

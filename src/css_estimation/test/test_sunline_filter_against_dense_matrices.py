@@ -17,7 +17,11 @@ from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.symmetric import congruence, product, row_major
 
-rng = np.random.default_rng(20130601)
+
+@pytest.fixture
+def rng():
+    """Numbers of this test alone: they do not depend on which others run."""
+    return np.random.default_rng(20130601)
 
 
 def skew(w):
@@ -32,12 +36,12 @@ def upper(m):
     return tuple(float(m[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
 
 
-def random_covariance(scale=0.3):
+def random_covariance(rng, scale=0.3):
     a = scale * rng.normal(size=(3, 3))
     return a @ a.T + 1e-4 * np.eye(3)
 
 
-def random_direction():
+def random_direction(rng):
     s = rng.normal(size=3)
     return s / np.linalg.norm(s)
 
@@ -57,10 +61,10 @@ def stacked_update(s, p, normals, outputs, variance):
     )
 
 
-def test_propagation_is_the_solution_of_the_lyapunov_equation():
+def test_propagation_is_the_solution_of_the_lyapunov_equation(rng):
     """Eq. 7 with F = -[w x], G = I, integrated numerically."""
     w = np.array([0.03, -0.05, 0.02])
-    s, p, q, dt = random_direction(), random_covariance(), 1e-2, 2.0
+    s, p, q, dt = random_direction(rng), random_covariance(rng), 1e-2, 2.0
 
     def derivative(_, y):
         x, c = y[:3], y[3:].reshape(3, 3)
@@ -75,10 +79,10 @@ def test_propagation_is_the_solution_of_the_lyapunov_equation():
 
 
 @pytest.mark.parametrize("count", [1, 2, 4, 8])
-def test_cells_in_sequence_equal_the_stacked_joseph_update(count):
+def test_cells_in_sequence_equal_the_stacked_joseph_update(rng, count):
     for _ in range(50):
-        s, p = random_direction(), random_covariance()
-        normals = [random_direction() for _ in range(count)]
+        s, p = random_direction(rng), random_covariance(rng)
+        normals = [random_direction(rng) for _ in range(count)]
         outputs = rng.uniform(0.0, 1.0, count)
         variance = 10.0 ** rng.uniform(-4, -1)
         expected_s, expected_p, expected_nis = stacked_update(s, p, normals, outputs, variance)
@@ -91,9 +95,9 @@ def test_cells_in_sequence_equal_the_stacked_joseph_update(count):
         assert nis == pytest.approx(expected_nis, rel=1e-8)
 
 
-def test_constraint_projects_on_the_tangent_plane():
+def test_constraint_projects_on_the_tangent_plane(rng):
     for _ in range(50):
-        s, p = random_direction(), random_covariance(0.1)
+        s, p = random_direction(rng), random_covariance(rng, 0.1)
         length = rng.uniform(0.5, 1.5)
         s_hat, p_hat = constrain(tuple(length * s), tuple(s), upper(p), 1e9)
         t = np.eye(3) - np.outer(s, s)
@@ -112,8 +116,8 @@ def test_second_moment_along_the_sun_line_is_what_tangent_errors_leave():
     assert p[5] == pytest.approx(np.mean(shortening**2), rel=0.02)
 
 
-def test_bound_keeps_the_covariance_a_covariance():
-    p = random_covariance(5.0)
+def test_bound_keeps_the_covariance_a_covariance(rng):
+    p = random_covariance(rng, 5.0)
     _, bounded = constrain((0.0, 0.0, 1.0), (0.0, 0.0, 1.0), upper(p), 4.0)
     assert np.diag(dense(bounded)).max() == pytest.approx(4.0)
     assert np.linalg.eigvalsh(dense(bounded)).min() > 0.0
@@ -136,8 +140,8 @@ def test_covariance_stays_positive_through_any_run_of_cells(directions):
     assert np.linalg.eigvalsh(dense(p)).min() > -1e-12
 
 
-def test_symmetric_helpers():
-    m, p = Rotation.random(rng=rng).as_matrix(), random_covariance()
+def test_symmetric_helpers(rng):
+    m, p = Rotation.random(rng=rng).as_matrix(), random_covariance(rng)
     rows = tuple(tuple(r) for r in m.tolist())
     np.testing.assert_allclose(dense(congruence(rows, upper(p))), m @ p @ m.T, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(product(upper(p), (1.0, 2.0, 3.0)), p @ (1.0, 2.0, 3.0), rtol=1e-13)

@@ -4,7 +4,6 @@
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from css_monte_carlo.coverage import CellMap, Grid
 
@@ -46,6 +45,8 @@ def seen_fractions(grid: Grid, result: CellMap) -> list[float]:
 
 def holes(grid: Grid, result: CellMap) -> list[Hole]:
     """Regions that no cell sees, the largest first; smaller ones than a cell of the grid are not found."""
+    from scipy import ndimage  # slow to load, and studies read this module without it
+
     labels, count = ndimage.label(result.seen_by == 0)
     # the map is cut open along one meridian and at the poles: join what touches there
     joined = np.arange(count + 1)

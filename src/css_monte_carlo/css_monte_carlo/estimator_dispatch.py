@@ -12,7 +12,7 @@ from numba.extending import overload
 
 
 def estimate(p, state, dt, voltages, aiding, eclipse_predicted):
-    """One cycle of the estimator that owns the parameters `p`; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle of the estimator that owns the parameters `p`; arguments in `css_estimation.sun.sun_algorithm`."""
     return sys.modules[type(p).__module__].step(p, state, dt, voltages, aiding, eclipse_predicted)
 
 

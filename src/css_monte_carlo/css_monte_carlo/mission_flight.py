@@ -3,7 +3,6 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from types import ModuleType
 from typing import Literal, NamedTuple, overload
 
 import numpy as np
@@ -17,6 +16,7 @@ from css_common.stepping import first_step
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
+from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.case_tallies import step_marks
 from css_monte_carlo.loop import Cases, CaseState, Vehicle
@@ -170,7 +170,7 @@ class MissionFlight:
         return tables, [CaseState(rotation, estimator, control, _NOWHERE, -1) for rotation in rotations]
 
     @property
-    def _algorithm(self) -> ModuleType:
+    def _algorithm(self) -> SunAlgorithm:
         component = self._estimator.component
         assert issubclass(component, SunEstimator)
         return component.algorithm

@@ -3,12 +3,14 @@
 
 import numpy as np
 import pytest
+from listing import estimators_by_mission
 
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
+from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
-from css_monte_carlo.direct_flight import fly_directly
+from css_monte_carlo.direct_flight import configured, fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_msgs.msg import SunEstimate
@@ -69,6 +71,13 @@ def same_steps(mission):
 def test_every_step_is_the_same(variant):
     mission = load_mission("okeefe_2013").with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
     assert same_steps(mission) == 200
+
+
+@pytest.mark.parametrize("estimator", estimators_by_mission(SunEstimator)["okeefe_2013"])
+@pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
+def test_every_estimator_is_the_same(estimator, gyro):
+    mission = configured(load_mission("okeefe_2013"), estimator=estimator, gyro=gyro)
+    assert same_steps(mission.with_overrides(["mission.duration=20.0"])) == 200
 
 
 # sunrise after two minutes, and gains that then find the Sun in one

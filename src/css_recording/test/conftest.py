@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from css_common.executor import create_executor, retire
+from css_common.testing import DEADLINE
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.schemas import dependencies, schema_of
@@ -95,7 +96,7 @@ def doctor() -> Callable[[Path], str]:
 
     def check(path: Path) -> str:
         command = [str(Path(sys.executable).with_name("pymcap-cli")), "doctor", str(path)]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+        run = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
         assert run.returncode == 0, run.stdout + run.stderr
         return run.stdout
 
@@ -122,7 +123,7 @@ class Graph:
         """A plain node."""
         return self.add(Node(name, **self.options))
 
-    def spin_until(self, condition: Callable[[], bool], limit: float = 30.0) -> None:
+    def spin_until(self, condition: Callable[[], bool], limit: float = DEADLINE) -> None:
         """Run callbacks until something is so."""
         end = time.monotonic() + limit
         while not condition():

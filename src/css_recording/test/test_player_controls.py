@@ -16,6 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
+from css_common.testing import DEADLINE
 from css_msgs.msg import CssVoltages, WheelTorqueCommand
 from css_recording import player_controls
 from css_recording.bag_reader import BagReader
@@ -271,7 +272,7 @@ def test_keys_on_a_terminal_hold_and_let_go(flight, tmp_path, graph, heard):
         os.write(typist, b"s")
         graph.spin_until(lambda: len(heard) == 2)
         os.write(typist, b" ")
-        output, errors = process.communicate(timeout=30)
+        output, errors = process.communicate(timeout=DEADLINE)
         graph.spin_until(lambda: len(heard) == 11)
         assert process.returncode == 0, errors
         result = json.loads(output.splitlines()[-1])
@@ -292,7 +293,7 @@ def test_an_interrupt_ends_a_held_playback_cleanly(flight, tmp_path, graph, hear
         node = graph.nodes[0]
         graph.spin_until(lambda: node.get_publishers_info_by_topic("/css/voltages"))
         process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=30)
+        output, errors = process.communicate(timeout=DEADLINE)
         assert process.returncode == 0, errors
         assert "0 messages of 0 stamps" in output
         assert "Traceback" not in errors

@@ -12,6 +12,7 @@ from sensor_msgs.msg import Imu
 
 from css_common.codec import codec_of, stamp_of
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION, RECORDER_SUBSCRIPTION
+from css_common.testing import DEADLINE
 from css_msgs.msg import CssVoltages, SunEstimate
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
@@ -172,7 +173,7 @@ def test_player_process_loops_until_told_to_end(flight, tmp_path, graph):
     try:
         graph.spin_until(lambda: len(voltages.heard) > 25)
         process.send_signal(signal.SIGINT)
-        assert process.wait(30) == 0
+        assert process.wait(DEADLINE) == 0
     finally:
         process.kill()
     assert "messages of" in process.stdout.read()

@@ -13,6 +13,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from css_common.qos import LOOP_PUBLISHER
+from css_common.testing import DEADLINE
 from css_msgs.msg import CssVoltages
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
@@ -168,7 +169,7 @@ def test_recorder_process_finishes_its_recording_when_told_to_end(flight, tmp_pa
         # no waiting: what is on its way when the signal comes is taken
         process.send_signal(number)
         process.send_signal(number)
-        assert process.wait(30) == 0
+        assert process.wait(DEADLINE) == 0
     finally:
         process.kill()
     assert contents(folder) == voltages_of(flight, 80)
@@ -257,7 +258,7 @@ def test_command_splits_and_says_what_never_came(flight, tmp_path, graph):
         for _, _, data in voltages_of(flight, 80):
             publisher.publish(data)
         process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=30)
+        output, errors = process.communicate(timeout=DEADLINE)
     finally:
         process.kill()
     assert process.returncode == 1

@@ -20,6 +20,7 @@ from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.recovery import recover
 from css_recording.schemas import schema_of
+from css_recording.split_bag_writer import FileLimits, SplitBagWriter
 
 QOS = QosProfile("best_effort", "transient_local", "keep_last", 7)
 
@@ -237,3 +238,39 @@ def test_two_topics_of_one_type_share_a_schema(flight, tmp_path):
         summary = make_reader(file).get_summary()
     assert len(summary.schemas) == 1
     assert sorted(channel.topic for channel in summary.channels.values()) == ["/a", "/b"]
+
+
+@pytest.mark.parametrize("files", [None, FileLimits(), FileLimits(longest_ns=3 * 10**9)])
+def test_times_of_a_recording_whose_last_and_first_messages_came_late(flight, tmp_path, files):
+    """The span of a recording is that of its messages, whichever batch brings them last."""
+    folder = tmp_path / "late"
+    messages = flight.messages(45)
+    # some of the middle come at the end, and the very first ones after five steps
+    arrival = [*messages[9:60], *messages[:9], *messages[66:], *messages[60:66]]
+    writer = BagWriter(folder, flight.topics) if files is None else SplitBagWriter(folder, flight.topics, files=files)
+    with writer:
+        for message in arrival:
+            writer.write(*message)
+            if message == messages[66]:
+                writer.flush()
+    first_ns, last_ns = messages[0][1], messages[-1][1]
+    information = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]
+    assert information["starting_time"]["nanoseconds_since_epoch"] == first_ns
+    assert information["duration"]["nanoseconds"] == last_ns - first_ns
+    spans = []
+    for path in sorted(folder.glob("*.mcap")):
+        with path.open("rb") as file:
+            reader = make_reader(file)
+            statistics = reader.get_summary().statistics
+            stamps = [message.log_time for _, _, message in reader.iter_messages()]
+            chunks = reader.get_summary().chunk_indexes
+        spans.append((statistics.message_start_time, statistics.message_end_time))
+        assert spans[-1] == (min(stamps), max(stamps))
+        assert min(c.message_start_time for c in chunks) == min(stamps)
+        assert max(c.message_end_time for c in chunks) == max(stamps)
+    assert (min(s for s, _ in spans), max(e for _, e in spans)) == (first_ns, last_ns)
+    of_files = [
+        (file["starting_time"]["nanoseconds_since_epoch"], file["duration"]["nanoseconds"])
+        for file in information["files"]
+    ]
+    assert of_files == [(start, end - start) for start, end in spans]

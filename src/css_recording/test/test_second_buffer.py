@@ -67,6 +67,29 @@ def test_what_is_held_spans_less_than_a_second_or_the_hold_back_time_and_half_of
     assert most == most_ns - STEP_NS
 
 
+@pytest.mark.parametrize("cut", [1, 8 * 3, 9 * 3, 30])
+def test_what_follows_a_flush_within_its_span_is_not_late(cut):
+    """A flush hands out what is there; the span that it cut goes on, and nothing of it is out of order."""
+    messages = regular(20)
+    buffer = SecondBuffer(LIMITS)
+    batches = [batch for message in messages[:cut] for batch in buffer.add(message) or []]
+    batches += buffer.drain()
+    assert [message for batch in batches for message in batch] == messages[:cut] and buffer.held() == []
+    rest = [batch for message in messages[cut:] for batch in buffer.add(message) or []] + buffer.drain()
+    assert [message for batch in rest for message in batch] == messages[cut:]
+    assert buffer.late_messages == 0
+
+
+def test_what_follows_a_flush_from_before_its_last_span_is_late():
+    buffer = SecondBuffer(LIMITS)
+    for message in regular(20):
+        buffer.add(message)
+    buffer.drain()
+    buffer.add(regular(8)[-1])  # the last of the first span of eight steps
+    assert buffer.late_messages == 1
+    assert buffer.drain() == [[regular(8)[-1]]]
+
+
 def test_late_messages_are_kept_apart_counted_and_not_held_back():
     messages = regular(40)
     batches, late = run(messages[:3] + messages[60:90] + messages[3:6] + messages[90:])

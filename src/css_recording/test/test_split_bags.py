@@ -2,6 +2,8 @@
 """Recordings of several files, read by others and by Sunpoint."""
 
 import shutil
+from collections import deque
+from itertools import starmap
 
 import pytest
 import yaml
@@ -131,8 +133,7 @@ def test_a_full_disk_between_two_files_ends_the_recording_with_what_it_has(fligh
             writer.write(*message)
         monkeypatch.setattr("css_recording.split_bag_writer.McapOutput", refuse)
         with pytest.raises(BagError, match="No space left"):
-            for message in flight.messages(60, first=5):
-                writer.write(*message)
+            deque(starmap(writer.write, flight.messages(60, first=5)))
         assert writer.closed
     assert messages(tmp_path / "bag" / "bag_0.mcap") == flight.messages(10)
 

@@ -98,7 +98,7 @@ def angular_acceleration(
 
 
 @kernel
-def _runge_kutta(inertia, inverse, sigma, omega, h0_b, motor_b, torque_b, dt):
+def _runge_kutta(inertia, inverse, sigma, omega, h0_b, motor_b, torque_b, dt) -> tuple[Vec3, Vec3]:
     """One RK4 step; the sum of wheel momenta grows linearly from `h0_b` because the motor torque is held."""
     half = 0.5 * dt
     h_half = add(h0_b, scale(half, motor_b))
@@ -190,7 +190,7 @@ def integration_steps(p: RigidBody, omega_bn_b: Vec3, h_b: Vec3, torque_b: Vec3,
 
 
 @kernel
-def _integrate(p, state, h_b, motor_b, external_torque_b, dt):
+def _integrate(p, state, h_b, motor_b, external_torque_b, dt) -> RotationState:
     torque_b = subtract(external_torque_b, motor_b)
     sigma, omega = state.sigma_bn, state.omega_bn_b
     steps = integration_steps(p, omega, h_b, torque_b, dt)
@@ -252,7 +252,7 @@ def propagate(
     external_torque_b: Vec3,
     dt: float,
     wheel_torque_out,
-):
+) -> tuple[RotationState, int, int]:
     """Advance attitude, rate and wheel momenta by `dt` [s] under constant motor and external torques.
 
     A command beyond a wheel's torque limit is cut to it. A torque that would carry a wheel past its speed

@@ -64,7 +64,9 @@ def _sun_at(motion: PayloadMotion, geometry: SlitGeometry, head: int, sun_n: Vec
 
 
 @kernel
-def _root(motion: PayloadMotion, geometry: SlitGeometry, head: int, slit: int, sun_n: Vec3, a: float, b: float):
+def _root(
+    motion: PayloadMotion, geometry: SlitGeometry, head: int, slit: int, sun_n: Vec3, a: float, b: float
+) -> float:
     """Instant between a and b at which the sign changes (regula falsi, Illinois variant)."""
     fa = off_slit(geometry, slit, _sun_at(motion, geometry, head, sun_n, a))
     fb = off_slit(geometry, slit, _sun_at(motion, geometry, head, sun_n, b))

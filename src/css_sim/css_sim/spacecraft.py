@@ -68,7 +68,7 @@ def advance(
     environment: EnvironmentState,
     dt: float,
     wheel_torque_out,
-):
+) -> tuple[RotationState, int, int]:
     """Advance by one control cycle under commands that are held over it.
 
     Torques of the environment are those at the start of the cycle.

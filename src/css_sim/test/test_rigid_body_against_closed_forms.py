@@ -205,6 +205,26 @@ def test_wheel_stops_exactly_at_its_speed_limit_and_leaves_it_freely():
     assert wheel_speed(PLANT.wheels[0], state.omega_bn_b, momentum[0]) < limit - 2.0
 
 
+@pytest.mark.parametrize("wheel_inertia", [0.001, 0.05, 0.4])
+def test_all_wheels_end_at_their_limits_however_heavy_they_are(wheel_inertia):
+    """Each pass leaves the ratio of wheel to body inertia of the excess that it found: four leave its fourth power."""
+    p = rigid_body(INERTIA, AXES, wheel_inertia, 100.0, 6000.0)
+    limit, rise = p.wheels["max_speed"][0], 5.0
+    # commands along one axis of the body, each of which alone would turn it: the cuts move one another's speeds
+    state, torque = RotationState(ZERO, (0.01, -0.02, 0.005)), 10.0 * rise * wheel_inertia
+    momentum = np.array([wheel_momentum_at_speed(w, state.omega_bn_b, limit - 1e-3) for w in p.wheels])
+    command, applied = np.array([torque, torque, -torque, torque]), np.zeros(4)
+    state, torque_limited, speed_limited = propagate(p, state, momentum, command, ZERO, 0.1, applied)
+    speed = np.array([wheel_speed(p.wheels[i], state.omega_bn_b, momentum[i]) for i in range(4)])
+    excess = np.abs(speed[[0, 1, 3]] - limit)
+    assert torque_limited == 0 and speed_limited == 0b1011
+    # the largest part of one wheel's cut that shows in another's speed
+    axes = axes_of(p)
+    coupling = wheel_inertia * np.abs(axes.T @ np.linalg.inv(INERTIA) @ axes)
+    ratio = np.max(coupling.sum(axis=0) - np.diag(coupling)) + 1e-3
+    assert excess.max() < rise * ratio**4 + 1e-9 * limit
+
+
 bounded = st.floats(-1.0, 1.0)
 triple = st.tuples(bounded, bounded, bounded)
 quadruple = st.tuples(bounded, bounded, bounded, bounded)

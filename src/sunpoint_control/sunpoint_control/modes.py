@@ -16,6 +16,7 @@ Where several apply, the first in this list is taken.
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from css_common.declared import builder, given, made, table_of
@@ -98,7 +99,7 @@ class ModeState(NamedTuple):
     search_time: float  # [s] in the search script
 
 
-def conflicts(values: Values):
+def conflicts(values: Values) -> Iterator[str]:
     """Thresholds whose hysteresis is upside down, one message each."""
     if values[_DETUMBLE_EXIT_RATE] > values[_DETUMBLE_RATE]:
         yield "modes.detumble_exit_rate_deg_s: above modes.detumble_rate_deg_s, expected at most that"

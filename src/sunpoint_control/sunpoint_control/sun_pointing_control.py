@@ -6,6 +6,7 @@ more harm than coasting.
 """
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from css_common.declared import builder, made, part, table_of
@@ -97,7 +98,7 @@ class ControlOutput(NamedTuple):
     rods_saturated: int  # bit i: rod i was asked for more than it may give
 
 
-def conflicts(values: Values):
+def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between parameters, one message each."""
     yield from modes.conflicts(values)
     if not values.wheels.fitted:

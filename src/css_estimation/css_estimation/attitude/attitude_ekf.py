@@ -133,7 +133,9 @@ def _predict(p, state: AttitudeState, memory: AttitudeMemory, dt: float, gyro_b:
 
 
 @kernel
-def _finish(state: AttitudeState, gyro_b: Vec3, gyro_ok: bool, dt: float, started_now: bool, tally: Tally):
+def _finish(
+    state: AttitudeState, gyro_b: Vec3, gyro_ok: bool, dt: float, started_now: bool, tally: Tally
+) -> tuple[AttitudeState, AttitudeSolution]:
     """State for the next cycle, and what this one has to tell."""
     started = state.started or started_now
     validity, mode, age, used = VALIDITY_NONE, MODE_WAITING, 0.0, tally.used

@@ -151,7 +151,9 @@ def _lit_outputs(p: AttitudeParameters, memory: AttitudeMemory, voltages, intens
 
 
 @kernel
-def _take_direction(p, state, memory, m: DirectionMeasurement, tally: Tally, source: int, mask: int):
+def _take_direction(
+    p, state, memory, m: DirectionMeasurement, tally: Tally, source: int, mask: int
+) -> tuple[AttitudeState, Tally]:
     if m.dof == 0:
         return state, tally
     nis = normalised_innovation(memory.covariance, m)
@@ -166,7 +168,9 @@ def _take_direction(p, state, memory, m: DirectionMeasurement, tally: Tally, sou
 
 
 @kernel
-def _take_cells(p, state, memory, voltages, lit_mask: int, sun_b: Vec3, intensity: float, tally: Tally):
+def _take_cells(
+    p, state, memory, voltages, lit_mask: int, sun_b: Vec3, intensity: float, tally: Tally
+) -> tuple[AttitudeState, Tally]:
     c = p.cells.calibration
     covariance, work = memory.covariance, memory.work
     converged = _is_converged(p, memory)

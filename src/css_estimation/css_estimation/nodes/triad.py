@@ -131,7 +131,8 @@ class Triad(Component):
 
     def _solve(self, sighting: _Sighting, around: list[_FieldSample]) -> bool:
         u = (sighting.instant_ns - around[1].stamp_ns) / self._spacing_ns
-        field_b = self._interpolated(*(sample.field_b for sample in around), u)
+        before, left, right, after = (sample.field_b for sample in around)
+        field_b = self._interpolated(before, left, right, after, u)
         turn = sighting.rate * self._spacing_ns * 1e-9
         variance = self._variance(max(sample.variance for sample in around), norm(field_b), turn, u)
         at = self._environment.at((sighting.instant_ns - self.epoch_ns) * 1e-9)

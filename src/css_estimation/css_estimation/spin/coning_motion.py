@@ -12,7 +12,6 @@ has constant nutation theta and rates of precession phi and spin psi.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import least_squares
 
 _LEAST_PULSES = 24
 _EVALUATIONS = 60
@@ -77,6 +76,8 @@ def fit_motion(pulses: Pulses, coning: float, spin: float, sun_angle: float, hal
     """
     if len(pulses.time) < _LEAST_PULSES:
         return None
+    from scipy.optimize import least_squares  # half a second to load, for the few that look at coning
+
     elapsed = pulses.time - pulses.time[0]
     vertical = pulses.tangent == 0.0
     turn_rate = 2.0 * np.pi * spin

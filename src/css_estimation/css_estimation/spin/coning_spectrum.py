@@ -9,7 +9,6 @@ that each implies between the pulses of a passage.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lombscargle
 
 LEAST_FREQUENCY = 0.05
 """Below this [Hz] a change of the Sun angle is a drift."""
@@ -84,6 +83,8 @@ def peak_frequency(spectrum: Spectrum) -> float:
 def lomb_scargle(time: np.ndarray, angle: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     """(F,) share of the variance of the angles that a sinusoid of each frequency [Hz] takes, at the true times."""
     residual = detrended(time, angle)
+    from scipy.signal import lombscargle  # two seconds to load, for the few that look at coning
+
     return lombscargle(time - time[0], residual, 2.0 * np.pi * frequency, normalize=True, floating_mean=True)
 
 

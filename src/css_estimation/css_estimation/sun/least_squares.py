@@ -206,7 +206,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     seen = least_squares(p, voltages, top)
     return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)

@@ -177,7 +177,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[PyramidState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0

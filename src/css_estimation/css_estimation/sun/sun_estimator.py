@@ -2,7 +2,6 @@
 """A Sun estimator as a component of the graph; a node file only names the algorithm."""
 
 from collections.abc import Mapping
-from types import ModuleType
 from typing import ClassVar
 
 from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
@@ -15,6 +14,7 @@ from css_estimation.sun.eclipse_prediction import EclipsePrediction
 from css_estimation.sun.field_rate import USE_FIELD
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
+from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN, Aiding
 from css_estimation.sun.sun_tracking import RATE_CUTOFF
 from css_msgs.msg import SunEstimate
@@ -24,12 +24,12 @@ class SunEstimator(Component):
     """Cell outputs and, while they deliver, gyro and magnetometer in; `<node name>/sun_estimate` out.
 
     Class attributes:
-        algorithm: module of the shape that `css_estimation.sun.sun_heading` describes.
+        algorithm: module of this shape.
         mode_names: names of its modes, if changes between them are worth a line in the log.
     """
 
     shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "magnetometer")
-    algorithm: ClassVar[ModuleType]
+    algorithm: ClassVar[SunAlgorithm]
     mode_names: ClassVar[Mapping[int, str]] = {}
 
     @classmethod

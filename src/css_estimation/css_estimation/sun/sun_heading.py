@@ -1,14 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every Sun estimator returns, and the shape that all of them share.
-
-A Sun estimator is a module with a `PARAMETERS` table, `parameters(values)`, `initial_state(p)` and the kernel
-
-    step(p, state, dt, voltages, aiding, eclipse_predicted) -> (state, SunHeading)
-
-with `dt` [s] since the last step, `voltages` (N,) [-], `aiding` an `Aiding` and `eclipse_predicted` one of the
-`PREDICTION_*` constants. Node, replay and Monte Carlo need nothing else of it. What `parameters` returns is a
-NamedTuple that the module itself defines: by its type the Monte Carlo finds the module.
-"""
+"""What every Sun estimator is given and returns; `sun_algorithm` has the shape that they share."""
 
 from typing import NamedTuple
 

@@ -141,7 +141,9 @@ def initial_state(p: EkfParameters) -> EkfState:
 
 
 @kernel
-def update_cells(p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float):
+def update_cells(
+    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float
+) -> tuple[Vec3, Symmetric, float, int, int]:
     """Updates with every cell that the propagated `sun_b` or the gate selects.
 
     Returns:
@@ -178,7 +180,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[EkfState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, aiding)
     top = brightest(voltages)

@@ -79,7 +79,7 @@ def step(
     aiding: Aiding,
     eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
-    """One cycle; arguments in `css_estimation.sun.sun_heading`."""
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
     seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)

@@ -4,7 +4,7 @@
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import chi2
+from scipy import stats
 
 from css_analysis.figure_style import BLUE, VERMILION, legend, logarithmic, new_figure, save, style
 from css_analysis.spin_consistency import AttitudeCases
@@ -24,7 +24,7 @@ def write_attitude_figure(errors: AttitudeErrors, cases: AttitudeCases, path: Pa
         ordered = np.sort(cases.nees)
         below.plot(ordered, (np.arange(len(ordered)) + 0.5) / max(len(ordered), 1), color=BLUE, label="cases")
         x = np.linspace(0.0, 15.0, 300)
-        below.plot(x, chi2.cdf(x, 3), color=VERMILION, label="chi-square, 3")
+        below.plot(x, stats.chi2.cdf(x, 3), color=VERMILION, label="chi-square, 3")
         below.set_xlim(0.0, 15.0)
         below.set_xlabel("normalised estimation error squared")
         below.set_ylabel("share of cases")

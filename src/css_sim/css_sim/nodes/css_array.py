@@ -12,7 +12,7 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.vectors import multiply, vector_of
+from css_common.vectors import Mat3, multiply, vector_of
 from css_environment.albedo import albedo_output, new_workspace
 from css_environment.albedo_vector import MODELS, earth_light_sources
 from css_environment.earth_light import new_earth_view, new_light
@@ -122,7 +122,7 @@ class CssArray(Component):
         )
         return {"voltages": self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)}
 
-    def _earth_attitude(self, elapsed_s: float):
+    def _earth_attitude(self, elapsed_s: float) -> Mat3:
         """Rotation from n to the Earth-fixed frame, in the same segments and so the same digits as the ephemeris."""
         start_s = segment_start(elapsed_s)
         if start_s != self._segment_s:

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which test files see a module, directly or through what they import, nearest first."""
+
+import ast
+from collections import deque
+from functools import cache
+from pathlib import Path
+
+# This module imports what missions name: whoever loads a mission may run any node.
+_LOADER = "css_common.node_files"
+
+
+class Sources:
+    """The import graph of packages and tests below a folder."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        files = [file for file in sorted(root.glob("src/*/*/**/*.py")) if file.relative_to(root).parts[2] != "test"]
+        self.modules = {_module(root, file): file for file in files if file.relative_to(root).parts[2] != "launch"}
+        tests = [*sorted(root.glob("src/*/test/*.py")), *sorted(root.glob("tests/*.py"))]
+        self.helpers = {file.stem: file for file in tests if not file.name.startswith("test_")}
+        self.tests = [file for file in tests if file.name.startswith("test_")]
+
+    def seen_by(self, mutated: Path, beyond: int) -> tuple[list[Path], list[Path]]:
+        """Test files of the package of a source file that see it, and at most `beyond` others, both nearest first."""
+        distances = {test: self._distance(test, mutated) for test in self.tests}
+        known = [test for test in self.tests if distances[test] is not None]
+        package, across = self.root / "src" / mutated.relative_to(self.root).parts[1], self.root / "tests"
+        # at the same distance those that fly several packages together come before those of another package
+        known.sort(key=lambda test: (distances[test], not test.is_relative_to(across), test.parts))
+        own = [test for test in known if test.is_relative_to(package)]
+        return own, [test for test in known if test not in own][:beyond]
+
+    def _distance(self, test: Path, mutated: Path) -> int | None:
+        """Imports from a test file to a source file; None: no way leads there."""
+        waiting, seen = deque([(test, 0)]), {test}
+        while waiting:
+            file, distance = waiting.popleft()
+            if file == mutated:
+                return distance
+            for imported in self._imported(file):
+                if imported not in seen:
+                    seen.add(imported)
+                    waiting.append((imported, distance + 1))
+        return None
+
+    @cache  # noqa: B019 (lives as long as the program)
+    def _imported(self, file: Path) -> tuple[Path, ...]:
+        names = set()
+        for node in ast.walk(ast.parse(file.read_bytes())):
+            if isinstance(node, ast.Import):
+                names.update(alias.name for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                names.add(node.module)
+                names.update(f"{node.module}.{alias.name}" for alias in node.names)
+        found = [self.modules[name] for name in sorted(names) if name in self.modules]
+        found += [self.helpers[name] for name in sorted(names) if name in self.helpers]
+        if self.modules.get(_LOADER) == file:
+            found += [source for name, source in self.modules.items() if ".nodes." in name]
+        return tuple(found)
+
+
+def _module(root: Path, file: Path) -> str:
+    parts = file.relative_to(root / "src").with_suffix("").parts[1:]
+    return ".".join(parts).removesuffix(".__init__")

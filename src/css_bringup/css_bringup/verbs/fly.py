@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flies a mission, and says what came of it."""
+
+import argparse
+
+from css_analysis.estimator_runs import Run, estimator_runs
+from css_analysis.flight_log import read_flight
+from css_analysis.spin_flight import read_spinning
+from css_analysis.spin_summary import spin_lines, spin_object
+from css_bringup.flight_result import FlightResult, default_bag
+from css_bringup.fly_mission import fly, own_domain
+from css_bringup.mission_asked_for import mission_of
+from css_bringup.options import (
+    complain,
+    console,
+    errors,
+)
+from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_common.command import FAILED, INTERRUPTED
+from css_common.mission import Mission
+from css_recording.errors import BagError
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Flies as the options say; the exit code."""
+    if arguments.realtime is not None:
+        arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
+    mission = mission_of(arguments)
+    bag = None if arguments.no_record else (arguments.out or default_bag(mission))
+    with own_domain(mission, arguments.domain, bag, console) as domain:
+        result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+    result.domain = domain
+    return conclude(mission, result, as_json=arguments.json)
+
+
+def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
+    """Prints a flight's result and turns it into an exit code."""
+    runs: list[Run] = []
+    if result.bag is not None and result.steps > 0:
+        try:
+            runs = estimator_runs(read_flight(result.bag))
+        except BagError as error:
+            # a recorder that died leaves such a recording, and why it died is the better news
+            result.failure = result.failure or str(error)
+    print_result(console, result, runs)
+    spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
+    for line in spin_lines(spinning) if spinning is not None else ():
+        console.print(line, soft_wrap=True)
+    flown = not (result.failure or result.interrupted)
+    missed = unmet(result, runs) if flown and result.bag is not None else []
+    for line in missed:
+        complain("criterion missed:", line)
+    print_incidents(result)
+    if as_json:
+        print_json(flight_object(result, runs) | ({} if spinning is None else {"spin": spin_object(spinning)}))
+    if result.interrupted:
+        errors.print("interrupted; the recording up to here is complete")
+        return INTERRUPTED
+    return FAILED if result.failure or result.notes or missed else 0

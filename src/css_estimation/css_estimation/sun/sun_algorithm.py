@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The shape of a Sun estimator's module; node, replay and Monte Carlo need nothing else of it."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from css_common.schema import Table, Values
+from css_estimation.sun.sun_heading import Aiding, SunHeading
+
+
+class SunAlgorithm(Protocol):
+    """A module such as `wavg`.
+
+    What `parameters` gives is a NamedTuple that the module itself defines: by its type the Monte Carlo finds it.
+    """
+
+    @property
+    def PARAMETERS(self) -> Table:
+        """What a node with it declares."""
+
+    @property
+    def parameters(self) -> Callable[[Values], Any]:
+        """The algorithm's own parameters from checked values."""
+
+    @property
+    def initial_state(self) -> Callable[[Any], Any]:
+        """State before the first cycle, for given parameters."""
+
+    @property
+    def step(self) -> Callable[[Any, Any, float, Any, Aiding, int], tuple[Any, SunHeading]]:
+        """One cycle, a kernel.
+
+        Args: parameters; state; time [s] since the last step; voltages (N,) [-], NaN where one is missing; what other
+        sensors measured; `PREDICTION_*` of an orbit model. Gives the state after it and what it came to.
+        """

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the loop counts step by step against what the log of the same flight says, for flights made up at random.
+
+Stretches are as long as the windows of the definitions, one step more and one less, so that a window that begins or
+ends at another step is seen.
+"""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from synthetic_flight import estimates, flight, stamps, tilted
+
+from css_analysis.estimator_runs import estimator_runs
+from css_analysis.flight_log import FlightLog
+from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes
+from css_common.kernel import typed_call
+from css_estimation.sun.sun_heading import NO_COVARIANCE, VALIDITY_VALID, SunHeading
+from css_monte_carlo.case_table import case_table
+from css_monte_carlo.case_tallies import FINAL, LATE, REPORTED, SUNLIT, new_tallies, step_marks, tally_step
+
+_tally_step = typed_call(tally_step)
+UP = (0.0, 0.0, 1.0)
+STILL = (0.0, 0.0, 0.0)
+WINDOWS = Windows(settled_time=300.0, late_time=300.0, report_time=3000.0)
+OFF_DEG = 2.0  # of the estimate from the true Sun
+
+
+def heading(sun_b):
+    return SunHeading(tuple(sun_b), NO_COVARIANCE, STILL, 0.0, 0.0, 0, 1, VALIDITY_VALID, 0, 0, 1)
+
+
+def tallied(pointing_deg, illumination, rates, period_s):
+    """Row of the case table of a flight with the Sun at angles from the array normal, and rates about it [rad/s]."""
+    tallies = new_tallies(1, len(pointing_deg), period_s, 10)
+    marks = step_marks(illumination, period_s, WINDOWS)
+    true, estimated = tilted(pointing_deg), tilted(pointing_deg + OFF_DEG)
+    for step, rate in enumerate(rates.tolist()):
+        sun_b, said = tuple(true[step].tolist()), heading(estimated[step].tolist())
+        _tally_step(tallies, 0, step, int(marks[step]), sun_b, (0.0, 0.0, rate), UP, STILL, said)
+    (row,) = case_table(np.arange(1), tallies, period_s, WINDOWS).to_pylist()
+    return row
+
+
+def logged(pointing_deg, illumination, rates, period_s) -> FlightLog:
+    log = flight(pointing_deg, illumination, ekf=estimates(tilted(pointing_deg + OFF_DEG)))
+    truth = log.having("truth")
+    truth.omega_bn_b[:, 2] = rates
+    truth.stamp_ns = log.estimates["ekf"].stamp_ns = stamps(len(rates), period_s)
+    log.period = period_s
+    return log
+
+
+stretch = st.tuples(
+    st.sampled_from([1, 5, 58, 59, 60, 61, 62, 120]),
+    st.sampled_from([10.0, 29.0, 31.0, 80.0]),
+    st.sampled_from([0.0, 0.5, 0.51, 1.0]),
+)
+
+
+@settings(max_examples=150)
+@given(st.lists(stretch, min_size=1, max_size=6))
+def test_a_flight_is_counted_as_it_is_logged(stretches):
+    pointing = np.concatenate([np.full(n, angle) for n, angle, _ in stretches])
+    light = np.concatenate([np.full(n, share) for n, _, share in stretches])
+    rates = np.linspace(0.0, 0.1, len(pointing)) ** 2
+    row, log = tallied(pointing, light, rates, 1.0), logged(pointing, light, rates, 1.0)
+    (run,) = estimator_runs(log)
+    at = acquisition(log)
+    assert row["acquired_s"] == (None if at is None else float(at))
+    for key, of_the_log in (
+        ("converging_s", "power_positive_s"),
+        ("heading_error_mean_deg", "heading_error_mean_deg"),
+        ("pointing_error_mean_deg", "pointing_error_mean_deg"),
+        ("rate_final_deg_s", "rate_final_deg_s"),
+    ):
+        expected = run[of_the_log]
+        assert row[key] == (None if expected is None else pytest.approx(expected, rel=1e-9)), key
+    first, *later = [sun.converging_s for sun in sunlit_passes(log)] or [0.0]
+    assert (row["converging_first_s"], row["converging_later_s"]) == (first, sum(later))
+
+
+@pytest.mark.parametrize("period_s", [1.0, 0.1, 0.25])
+def test_windows_are_as_long_as_they_say(period_s):
+    """Steps of the last minute, of the minute before 3000 s, and of the last 300 s of sunlight."""
+    steps = round(3200.0 / period_s)
+    illumination = np.ones(steps)
+    dark = slice(round(2900.0 / period_s), round(3000.0 / period_s))
+    illumination[dark] = 0.4
+    marks = step_marks(illumination, period_s, WINDOWS)
+    elapsed = np.arange(steps) * period_s
+
+    def marked(mark):
+        return elapsed[(marks & mark) != 0]
+
+    np.testing.assert_allclose(marked(FINAL), elapsed[-round(60.0 / period_s) :])
+    reported = marked(REPORTED)
+    assert len(reported) == round(60.0 / period_s)
+    assert (reported[0], reported[-1]) == pytest.approx((2940.0 + period_s, 3000.0))
+    late = marked(LATE)
+    assert len(late) == round(300.0 / period_s)
+    # 200 s after the eclipse and 100 s before it
+    assert (late[0], late[-1]) == pytest.approx((2800.0, 3200.0 - period_s))
+    assert not np.any(marks[dark] & SUNLIT) and not np.any(marks[dark] & LATE)
+
+
+def test_a_flight_that_ends_before_fifty_minutes_reports_nothing_then():
+    assert not np.any(step_marks(np.ones(3000), 1.0, WINDOWS) & REPORTED)
+    assert np.count_nonzero(step_marks(np.ones(3001), 1.0, WINDOWS) & REPORTED) == 60

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What `benchmarks/mutants.py` changes, and by which tests it looks for the change."""
+
+import ast
+import sys
+from collections import Counter
+
+import pytest
+from listing import ROOT
+
+sys.path.insert(0, str(ROOT / "benchmarks"))
+from mutants import draw
+from mutations import mutations
+from relevant_tests import Sources
+
+SOURCE = b'''"""Documentation: -1 < 2."""
+
+LIMIT: float = 2.0
+
+
+def f(x: int = 3) -> int:
+    """More, 4."""
+    if x < -LIMIT and not x[1]:
+        x.y = 5
+        return None
+    x += x * f"{x + 1}"
+    return x if x == 0.0 else "6"
+'''
+
+
+@pytest.fixture(scope="module")
+def sources():
+    return Sources(ROOT)
+
+
+def test_every_kind_of_change_and_no_other():
+    changed = Counter((m.kind, m.applied(SOURCE).decode().splitlines()[m.line - 1].strip()) for m in mutations(SOURCE))
+    assert changed == Counter(
+        [
+            ("constant changed", "LIMIT: float = 4.0"),
+            ("constant changed", "def f(x: int = 4) -> int:"),
+            ("condition negated", "if (not (x < -LIMIT and not x[1])):"),
+            ("operator swapped", "if x < -LIMIT or not x[1]:"),
+            ("comparison moved", "if x <= -LIMIT and not x[1]:"),
+            ("sign changed", "if x < (LIMIT) and not x[1]:"),
+            ("condition negated", "if x < -LIMIT and (x[1]):"),
+            ("index shifted", "if x < -LIMIT and not x[0]:"),
+            ("statement dropped", "pass"),
+            ("constant changed", "x.y = 6"),
+            ("statement dropped", "pass"),
+            ("operator swapped", 'x -= x * f"{x + 1}"'),
+            ("operator swapped", 'x += x / f"{x + 1}"'),
+            ("condition negated", 'return x if (not (x == 0.0)) else "6"'),
+            ("comparison moved", 'return x if x != 0.0 else "6"'),
+            ("constant changed", 'return x if x == 1.0 else "6"'),
+        ]
+    )
+
+
+def test_changes_of_all_packages_are_valid_and_change_something(sources):
+    for file in sources.modules.values():
+        source = file.read_bytes()
+        before = ast.dump(ast.parse(source))
+        for mutation in mutations(source)[::29]:
+            assert ast.dump(ast.parse(mutation.applied(source))) != before, (file, mutation)
+
+
+def test_the_draw_is_even_over_packages_and_the_beginning_of_a_longer_one():
+    names = [mutant.name for mutant in draw(ROOT, 1, 60)]
+    assert names[:20] == [mutant.name for mutant in draw(ROOT, 1, 20)]
+    assert names != [mutant.name for mutant in draw(ROOT, 2, 60)]
+    assert len(set(names)) == 60
+    counts = Counter(name.split("/")[1] for name in names)
+    assert set(counts) == {path.parent.name for path in ROOT.glob("src/*/setup.py")}
+    assert max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sources):
+    own, others = sources.seen_by(ROOT / "src/css_sim/css_sim/gyro.py", 3)
+    names = [test.name for test in own]
+    assert {"test_gyro_and_magnetometer_statistics.py", "test_draws_are_independent.py"} <= set(names[:3])
+    assert "test_simulation_components.py" in names[:4] and "test_slit_crossings.py" not in names
+    assert len(others) == 3 and not any("css_sim" in test.parts for test in others)
+    # a node file is imported by what loads missions
+    _, others = sources.seen_by(ROOT / "src/css_estimation/css_estimation/nodes/coning.py", 50)
+    assert ROOT / "tests/test_components.py" in others
