@@ -11,7 +11,7 @@ from css_bringup.flight_changes import ParameterChange, RecordedSetting, setting
 from css_bringup.retracing import Given, Retrace
 from css_common.component import Input, Output
 from css_common.matching import Matcher
-from css_common.mission import SHARED, Event, Mission, Node, find_component
+from css_common.mission import Event, Mission, Node, find_component
 from css_common.schema import shaped_values
 from css_common.stepping import Stepper
 from css_recording.bag_metadata import absolute
@@ -162,19 +162,6 @@ def replayed(
         and took_settings
     )
     return run
-
-
-def uses_orbit(node: Node) -> bool:
-    """Whether an estimator asks a model of the orbit: for the shadow, or for Sun and field along it."""
-    if "orbit" not in node.component.shared:
-        return False
-    eclipse = getattr(node.values, "eclipse", None)
-    return eclipse is None or eclipse.source != "sensors"
-
-
-def node_keys(mission: Mission, name: str) -> set[str]:
-    """Parameters that a mission gives for a node, its own and the shared ones."""
-    return {key for section in (SHARED, name) for key in mission.parameters.get(section, {})}
 
 
 def _node(mission: Mission, name: str) -> Node | None:

@@ -114,6 +114,7 @@ def test_scripted_changes_come_when_they_are_due():
     text = """
 /**:
   ros__parameters:
+    extends: okeefe_2013
     mission: {duration: 20.0}
     events:
       off: {time: 5.0, node: gyro, action: deactivate}

@@ -132,7 +132,9 @@ def test_the_same_over_several_blocks_and_scripted_changes():
       failed: {time: 135.0, node: css_array, action: set, parameter: faults, value: ['2 dead']}
       on: {time: 140.0, node: gyro, action: activate}
     """
-    mission = mission_from_text(f"/**:\n  ros__parameters:\n    mission: {{duration: 150.0}}{events}", "scripted")
+    mission = mission_from_text(
+        f"/**:\n  ros__parameters:\n    extends: okeefe_2013\n    mission: {{duration: 150.0}}{events}", "scripted"
+    )
     assert same_steps(mission) == 1500 > BLOCK_STEPS
 
 
@@ -142,7 +144,8 @@ REFUSED = {
         "scripted: events.a: the compiled loop switches sensors alone, here gyro",
     ),
     "two gyros": (
-        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
+        "/**: {ros__parameters: {extends: okeefe_2013, "
+        "graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
         "css_sim/gyro, css_estimation/ekf, sunpoint_control/mrp_control]}}}",
         "two",
     ),
@@ -160,6 +163,6 @@ def test_what_the_loop_has_no_place_for_is_named(case):
 
 def test_a_sun_estimator_beside_the_one_that_controls_has_no_place():
     nodes = "css_sim/dynamics,css_sim/css_array,css_estimation/ekf,css_estimation/wavg,sunpoint_control/mrp_control"
-    mission = default_mission().with_overrides([f"graph.nodes={nodes}"])
+    mission = load_mission("okeefe_2013").with_overrides([f"graph.nodes={nodes}"])
     with pytest.raises(NoPlace, match="wavg does not control"):
         MissionFlight(mission, "wavg")

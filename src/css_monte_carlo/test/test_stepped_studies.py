@@ -6,7 +6,7 @@ import pytest
 
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_metrics import windows_of
-from css_common.mission import MissionError, default_mission, load_mission, mission_from_text
+from css_common.mission import MissionError, load_mission, mission_from_text
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import fly_directly
@@ -17,7 +17,7 @@ from css_monte_carlo.study_summary import configuration_objects
 
 COARSE = ("mission.period=1.0", "mission.duration=330", "mrp_control.gains.p=0.5")
 SHORT = {
-    "Sun estimator with control": lambda: (default_mission().with_overrides(COARSE), "ekf"),
+    "Sun estimator with control": lambda: (load_mission("okeefe_2013").with_overrides(COARSE), "ekf"),
     "attitude filter": lambda: (load_mission("cubesat_vmm", ["mission.duration=330"]), "attitude_voltage"),
 }
 

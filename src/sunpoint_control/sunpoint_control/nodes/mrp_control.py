@@ -59,7 +59,7 @@ class MrpControl(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("spacecraft.inertia", "wheels.axes")
+        return ("spacecraft.inertia", "wheels.axes") if values.wheels.fitted else ("spacecraft.inertia",)
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
