@@ -77,6 +77,8 @@ def test_the_final_rate_is_that_of_the_last_minute():
 def test_an_attitude_counts_from_three_hundred_seconds_on():
     count = steps(400.0)
     log = flight(np.full(count, 10.0))
+    log.mission = load_mission("cubesat_vmm")
+    assert log.mission.values.measures.settled_time == 300.0
     # an error that falls with time about z, in the quaternion of an attitude whose truth is b = n
     error = np.radians(5.0 - 0.01 * np.arange(count) * DT)
     quaternion = np.stack((0.0 * error, 0.0 * error, np.sin(0.5 * error), np.cos(0.5 * error)), 1)
