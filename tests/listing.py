@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from css_common.component import Component
-from css_common.mission import Mission, MissionError, default_mission, find_component, load_mission
+from css_common.mission import Mission, MissionError, find_component, load_mission
 
 ROOT = Path(__file__).parents[1]
 MISSIONS = sorted(path.stem for path in (ROOT / "config").glob("*.yaml"))
@@ -59,9 +59,9 @@ def with_every_flag(kind: type[Component]) -> dict[str, bool]:
 
 
 def estimators_by_mission(base: type[Component]) -> dict[str, list[str]]:
-    """Estimators of a base class by the mission that they fly in; those of none may fly in the default one."""
+    """Estimators of a base class by the mission that they fly in; those of none may fly in that of O'Keefe & Schaub."""
     by_mission: dict[str, list[str]] = {}
     for kind in components(base=base):
-        mission = mission_of(kind) or default_mission()
+        mission = mission_of(kind) or load_mission("okeefe_2013")
         by_mission.setdefault(mission.name, []).append(executable(kind))
     return by_mission

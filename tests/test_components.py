@@ -7,7 +7,7 @@ from listing import MISSIONS, components, executable, mission_of
 
 from css_common.codec import codec_of, type_name
 from css_common.component import INERTIAL
-from css_common.mission import default_mission, load_mission
+from css_common.mission import load_mission
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.direct_flight import configured, fly_and_keep
 
@@ -18,7 +18,7 @@ STAND_INS = [executable(kind) for kind in components(base=SunEstimator) if missi
 
 def flight_of(name):
     """A mission, or the default one with another estimator, cut to some cycles."""
-    mission = load_mission(name) if name in MISSIONS else configured(default_mission(), estimator=name)
+    mission = load_mission(name) if name in MISSIONS else configured(load_mission("okeefe_2013"), estimator=name)
     return mission.with_overrides([f"mission.duration={CYCLES * mission.values.mission.period!r}"])
 
 

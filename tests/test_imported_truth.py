@@ -39,13 +39,8 @@ def test_errors_count_over_all_lines_and_nothing_is_told_of_arrays_that_nobody_d
     assert "mission: " in screen and "embedded mission" in screen
 
 
-def test_the_orbit_of_the_defaults_is_named_where_it_is_used(bag, capsys):
-    result, screen = replay(bag, capsys, "ekf", "flat")
-    ekf, flat = result["replayed"]
-    assert ekf["notes"] == []
-    (note,) = flat["notes"]
-    assert note.startswith("orbit: ") and "gives none, that of the defaults is used" in note
-    assert "flat:eclipse.source=sensors does without" in note
-    assert note in screen
-    result, _ = replay(bag.rename(bag.with_name("again")), capsys, "flat:eclipse.source=sensors")
-    assert result["replayed"][0]["notes"] == []
+def test_an_orbit_that_nobody_gave_is_asked_for(bag, capsys):
+    assert command.main([str(bag), "--out", str(bag.with_name("refused")), "--estimators", "ekf", "flat"]) == 2
+    assert "flat: orbit.source: missing, expected one of elements, tle, ballistic" in capsys.readouterr().err
+    result, _ = replay(bag, capsys, "ekf", "flat:eclipse.source=sensors")
+    assert [run["notes"] for run in result["replayed"]] == [[], []]

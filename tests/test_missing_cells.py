@@ -81,7 +81,14 @@ def test_a_cell_that_is_always_missing_leaves_open_what_it_alone_sees(tmp_path):
 
 def test_every_estimator_takes_a_missing_cell_and_gives_finite_numbers(tmp_path):
     bag = recording(tmp_path, lambda k, face, value: "" if FACES[k % 6] == face else f"{value:.9f}")
-    names = ("wavg", "wls", "ekf", "flat", "wavg:gate_kind=absolute,gate=0.1", "wls:use_dark_cells=true")
+    names = (
+        "wavg",
+        "wls",
+        "ekf",
+        "flat:eclipse.source=sensors",
+        "wavg:gate_kind=absolute,gate=0.1",
+        "wls:use_dark_cells=true",
+    )
     result = replayed(bag, *names)
     assert [(run.messages, run.failures) for run in result.replayed] == [(LINES, 0)] * len(names)
     for name, estimates in result.log.estimates.items():

@@ -77,7 +77,9 @@ def test_warned(overrides, words):
 
 def with_event(parameter, value):
     event = f"{{time: 30.0, node: mrp_control, action: set, parameter: {parameter}, value: {value}}}"
-    return mission_from_text(f"/**:\n  ros__parameters:\n    events:\n      late: {event}\n", "scripted.yaml")
+    return mission_from_text(
+        f"/**:\n  ros__parameters:\n    extends: okeefe_2013\n    events:\n      late: {event}\n", "scripted.yaml"
+    )
 
 
 def test_scripted_changes_are_checked_where_they_happen():

@@ -31,9 +31,9 @@ def flight(tmp_path_factory) -> Path:
     return bag
 
 
-def _replayed(source: Path, out: Path, *requests: str, remap=None):
+def _replayed(source: Path, out: Path, *requests: str, remap=None, name=None):
     remap = remap or {}
-    mission = mission_of_bag(source, remap, [], None)
+    mission = mission_of_bag(source, remap, [], name)
     return replay(source, out, mission, [parse_request(text) for text in requests], remap)
 
 
@@ -93,8 +93,10 @@ def test_sqlite_recording_with_other_topic_names(flight, tmp_path):
         for message in reader.messages(list(connections)):
             out.write(connections[message.topic], message.stamp_ns, message.data)
     remap = {"/obc/adc/sun": "/css/voltages", "/obc/imu": "/gyro/imu"}
-    foreign = _replayed(tmp_path / "foreign", tmp_path / "replay", "ekf", "wavg", remap=remap)
-    # the default mission is the one that flew, so the estimates are those of the flight
+    with pytest.raises(MissionError, match=r"holds no mission.*--mission NAME"):
+        _replayed(tmp_path / "foreign", tmp_path / "replay", "ekf", remap=remap)
+    foreign = _replayed(tmp_path / "foreign", tmp_path / "replay", "ekf", "wavg", remap=remap, name="okeefe_2013")
+    # the mission is the one that flew, so the estimates are those of the flight
     assert messages_by_topic(tmp_path / "replay")["/ekf/sun_estimate"] == messages_by_topic(flight)["/ekf/sun_estimate"]
     assert all(run["heading_error_mean_deg"] is None for run in foreign.runs)
 

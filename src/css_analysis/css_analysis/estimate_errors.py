@@ -90,12 +90,12 @@ def attitude_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray, 
     rows, steps = estimated_rows(log, name)
     errors, nees = np.empty(len(rows)), np.empty(len(rows))
     covariance = attitudes.covariance[rows].reshape(-1, 6, 6)
-    true = _true_attitudes(log, steps, attitudes.delay[rows])
+    true = true_attitudes(log, steps, attitudes.delay[rows])
     _attitude_errors_of_rows(attitudes.q_bn[rows], covariance, true, errors, nees)
     return steps, errors, nees
 
 
-def _true_attitudes(log: FlightLog, steps: np.ndarray, delay: np.ndarray) -> np.ndarray:
+def true_attitudes(log: FlightLog, steps: np.ndarray, delay: np.ndarray) -> np.ndarray:
     """(K, 3) sigma_bn so long (K,) [s] before steps (K,) of the truth: the next step's, turned back by its rate."""
     truth = log.having("truth")
     if not np.any(delay > 0.0):

@@ -88,7 +88,7 @@ class FlightLog:
         voltages, wheels, torque_command, control: columns of the topic, None when there is none.
         notes: what could not be read, one line each.
         imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
-            arrays of its mission are defaults that nobody gave.
+            arrays of its mission are unknown.
     """
 
     origin: str
@@ -158,7 +158,7 @@ class FlightLog:
 
     @cached_property
     def array_normal_b(self) -> np.ndarray:
-        """(3,) normal of the solar arrays; the default spacecraft's when the mission is unknown."""
+        """(3,) normal of the solar arrays; z when the mission is unknown."""
         if self.mission is not None:
             return self.mission.values.spacecraft.array_normal
         return _ARRAY_NORMAL.shaped(_ARRAY_NORMAL.default)

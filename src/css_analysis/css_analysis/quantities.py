@@ -17,8 +17,8 @@ from css_analysis.flight_metrics import EstimatorMeasures, Windows
 class CaseSums(NamedTuple):
     """What a study summed up while C cases flew."""
 
-    totals: np.ndarray  # (C,) with the fields that `css_monte_carlo.case_tallies.TALLY` has
-    histogram: np.ndarray  # (C, bins) heading errors after acquisition
+    totals: np.ndarray  # (C,) with the fields of `TALLY` of `css_monte_carlo.case_tallies` or `attitude_tallies`
+    histogram: np.ndarray  # (C, bins) heading errors after acquisition, or attitude errors once settled
     bin_deg: float
     period_s: float
 
@@ -36,6 +36,7 @@ class Quantity:
         without_value: why it may have no value although there are truth and estimates.
         measure: takes it from the log of a flight; None: only studies have it.
         tally: (C,) values from the sums over cases, NaN for what never came; None: studies lack it.
+        attitude_tally: the same where an attitude filter is measured.
         column: its name in a study, if that is another.
         whole: it is a count.
     """
@@ -48,6 +49,7 @@ class Quantity:
     without_value: str = ""
     measure: Callable[[EstimatorMeasures], float | int | None] | None = None
     tally: Callable[[CaseSums], np.ndarray] | None = None
+    attitude_tally: Callable[[CaseSums], np.ndarray] | None = None
     column: str = ""
     whole: bool = False
 
@@ -127,8 +129,23 @@ def _acquired(sums: CaseSums) -> np.ndarray:
     return np.where(step >= 0, step * sums.period_s, np.nan)
 
 
-def _heading_p95(sums: CaseSums) -> np.ndarray:
+def _error_p95(sums: CaseSums) -> np.ndarray:
     return np.array([percentile_of_histogram(row, 95.0, sums.bin_deg) for row in sums.histogram])
+
+
+def _first_attitude(sums: CaseSums) -> np.ndarray:
+    step = sums.totals["first_step"]
+    return np.where(step >= 0, step * sums.period_s, np.nan)
+
+
+def _largest_error(sums: CaseSums) -> np.ndarray:
+    return np.where(sums.totals["settled"] > 0, sums.totals["error_max"], np.nan)
+
+
+def _bias_nees(sums: CaseSums) -> np.ndarray:
+    nees = _mean("nees6_sum", "settled")(sums)
+    # a filter that estimates no bias has no covariance of it
+    return np.where(np.isfinite(nees), nees, np.nan)
 
 
 def _pointing_sunlit(sums: CaseSums) -> np.ndarray:
@@ -155,7 +172,7 @@ _HEADING_P95 = Quantity(
     heading="heading\nerror\n95 %",
     without_value=_NOT_ACQUIRED,
     measure=EstimatorMeasures.heading_error_p95_deg,
-    tally=_heading_p95,
+    tally=_error_p95,
 )
 _CONVERGING = (
     Quantity(
@@ -189,6 +206,7 @@ _ATTITUDE = (
         form="{:.3f}",
         without_value=_NOT_SETTLED,
         measure=EstimatorMeasures.attitude_error_mean_deg,
+        attitude_tally=_mean("error_sum", "settled"),
     ),
     Quantity(
         "attitude_error_p95_deg",
@@ -198,6 +216,22 @@ _ATTITUDE = (
         form="{:.3f}",
         without_value=_NOT_SETTLED,
         measure=EstimatorMeasures.attitude_error_p95_deg,
+        attitude_tally=_error_p95,
+    ),
+    Quantity(
+        "attitude_error_max_deg",
+        "deg",
+        "of attitude filters: largest angle of estimated to true attitude from measures.settled_time on",
+        heading="attitude\nerror\nmax",
+        attitude_tally=_largest_error,
+    ),
+    Quantity(
+        "gyro_bias_error_mean_deg_s",
+        "deg/s",
+        "of attitude filters: mean norm of the error of the estimated gyro bias from measures.settled_time on",
+        heading="gyro\nbias\nerror",
+        form="{:.4f}",
+        attitude_tally=_mean("bias_sum", "settled"),
     ),
     Quantity(
         "attitude_nees",
@@ -206,6 +240,30 @@ _ATTITUDE = (
         heading="attitude\nNEES\n(3)",
         without_value=_NOT_SETTLED,
         measure=EstimatorMeasures.attitude_nees,
+        attitude_tally=_mean("nees3_sum", "settled"),
+    ),
+    Quantity(
+        "attitude_bias_nees",
+        "",
+        "of attitude filters: mean normalised error squared of attitude and gyro bias together, 6 if consistent",
+        heading="with\nbias\n(6)",
+        attitude_tally=_bias_nees,
+    ),
+    Quantity(
+        "attitude_nis",
+        "",
+        "of attitude filters: mean normalised innovation squared for each degree of freedom, 1 if consistent",
+        heading="NIS\n(1)\n",
+        form="{:.3f}",
+        attitude_tally=_mean("nis_sum", "innovations"),
+    ),
+    Quantity(
+        "first_attitude_s",
+        "s",
+        "of attitude filters: time of the first attitude since the epoch",
+        heading="first\natti-\ntude",
+        form="{:.1f}",
+        attitude_tally=_first_attitude,
     ),
 )
 _POINTING = (
@@ -267,6 +325,7 @@ _REST = (
         form="{:d}",
         measure=EstimatorMeasures.steps_without_estimate,
         tally=lambda sums: sums.totals["without_estimate"],
+        attitude_tally=lambda sums: sums.totals["without_estimate"],
         whole=True,
     ),
 )
@@ -315,8 +374,13 @@ QUANTITIES = {quantity.name: quantity for quantity in quantities(Windows()) if q
 
 
 def study_quantities(windows: Windows) -> tuple[Quantity, ...]:
-    """What a study measures of its cases."""
+    """What a study measures of its cases, with the estimates of a Sun estimator."""
     return tuple(quantity for quantity in quantities(windows) if quantity.tally is not None)
+
+
+def attitude_quantities(windows: Windows) -> tuple[Quantity, ...]:
+    """What a study measures of its cases, with the estimates of an attitude filter."""
+    return tuple(quantity for quantity in quantities(windows) if quantity.attitude_tally is not None)
 
 
 def summaries(windows: Windows) -> tuple[Summary, ...]:
@@ -330,6 +394,17 @@ def summaries(windows: Windows) -> tuple[Summary, ...]:
         Summary("converging_max_s", "converging_s", "max", "con-\nverging\nmax", "s", "{:.1f}"),
         *map(_mean_over_cases, reported),
     )
+
+
+def attitude_summaries(windows: Windows) -> tuple[Summary, ...]:
+    """What is told of all cases of one configuration with an attitude filter."""
+    return tuple(map(_attitude_over_cases, attitude_quantities(windows)))
+
+
+def _attitude_over_cases(quantity: Quantity) -> Summary:
+    over = "max" if quantity.name == "attitude_error_max_deg" else "mean"
+    form = "{:.1f}" if quantity.whole else quantity.form
+    return Summary(quantity.name, quantity.study_column, over, quantity.heading, quantity.unit, form)
 
 
 def _mean_over_cases(quantity: Quantity) -> Summary:

@@ -9,7 +9,7 @@ from synthetic_flight import EPOCH_NS, columns, estimates, record, stamps, tilte
 from css_analysis.flight_log import angle, estimator_of, read_flight, to_body
 from css_analysis.message_columns import Columns, columns_of, stack
 from css_common.codec import DecodeError, codec_of
-from css_common.mission import default_mission
+from css_common.mission import load_mission
 from css_msgs.msg import ControlStatus, CssVoltages, SpacecraftState, SunEstimate, WheelState
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
@@ -133,7 +133,7 @@ def test_a_recording_comes_back(rng, tmp_path):
 
 def test_the_recorded_mission_tells_who_flew(rng, tmp_path):
     topics, folder = full_recording(rng, tmp_path / "flight")
-    mission = default_mission().with_overrides(["mission.epoch=2013-05-31T23:59:00Z"])
+    mission = load_mission("okeefe_2013").with_overrides(["mission.epoch=2013-05-31T23:59:00Z"])
     log = read_flight(record(folder, topics, mission=mission.text()))
     assert log.flown == "ekf"
     assert log.name == "okeefe_2013"

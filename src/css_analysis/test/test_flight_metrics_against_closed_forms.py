@@ -14,7 +14,7 @@ from css_analysis.flight_log import FlightLog
 from css_analysis.flight_metrics import acquisition, sunlit_passes
 from css_analysis.flight_summary import criteria_failures, print_summary
 from css_analysis.quantities import QUANTITIES
-from css_common.mission import default_mission
+from css_common.mission import load_mission
 from css_msgs.msg import AttitudeEstimate, ControlStatus
 
 
@@ -77,6 +77,8 @@ def test_the_final_rate_is_that_of_the_last_minute():
 def test_an_attitude_counts_from_three_hundred_seconds_on():
     count = steps(400.0)
     log = flight(np.full(count, 10.0))
+    log.mission = load_mission("cubesat_vmm")
+    assert log.mission.values.measures.settled_time == 300.0
     # an error that falls with time about z, in the quaternion of an attitude whose truth is b = n
     error = np.radians(5.0 - 0.01 * np.arange(count) * DT)
     quaternion = np.stack((0.0 * error, 0.0 * error, np.sin(0.5 * error), np.cos(0.5 * error)), 1)
@@ -146,7 +148,7 @@ def test_foreign_telemetry_has_no_figures_at_all():
 def test_flight_figures_belong_to_all_estimators():
     pointing = np.concatenate([np.full(300, 60.0), np.full(900, 12.0)])
     log = flight(pointing, ekf=estimates(tilted(pointing + 1.0)), wavg=estimates(tilted(pointing + 5.0)))
-    log.mission = default_mission()
+    log.mission = load_mission("okeefe_2013")
     log.control = columns(ControlStatus, stamps(1200))
     first, second = estimator_runs(log)
     assert (first["flown"], second["flown"]) == (True, False)

@@ -4,7 +4,15 @@
 from pathlib import Path
 
 from css_analysis.flight_metrics import Windows
-from css_analysis.quantities import QUANTITIES, quantities, readme_rows, study_quantities, summaries
+from css_analysis.quantities import (
+    QUANTITIES,
+    attitude_quantities,
+    attitude_summaries,
+    quantities,
+    readme_rows,
+    study_quantities,
+    summaries,
+)
 
 README = Path(__file__).parents[1] / "README.md"
 ALL = Windows(settled_time=300.0, late_time=300.0, report_time=3000.0)
@@ -19,11 +27,12 @@ def test_the_readme_has_the_rows_of_the_table():
 
 def test_names_and_columns_are_unique_and_every_quantity_comes_from_somewhere():
     table = quantities(ALL)
-    assert all(quantity.measure or quantity.tally for quantity in table)
+    assert all(quantity.measure or quantity.tally or quantity.attitude_tally for quantity in table)
     assert len({quantity.name for quantity in table}) == len(table)
-    columns = [quantity.study_column for quantity in study_quantities(ALL)]
-    assert len(set(columns)) == len(columns)
-    assert {summary.of for summary in summaries(ALL)} <= set(columns)
+    for of_cases, told in ((study_quantities, summaries), (attitude_quantities, attitude_summaries)):
+        columns = [quantity.study_column for quantity in of_cases(ALL)]
+        assert len(set(columns)) == len(columns)
+        assert {summary.of for summary in told(ALL)} <= set(columns)
 
 
 def test_what_a_mission_does_not_ask_for_is_not_there():

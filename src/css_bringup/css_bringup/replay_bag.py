@@ -15,7 +15,7 @@ from css_bringup.replay_pass import Replay
 from css_bringup.replay_verdict import shortcomings, software_apart
 from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
-from css_common.mission import Mission, default_mission, load_mission, mission_from_text
+from css_common.mission import Mission, MissionError, load_mission, mission_from_text
 from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
@@ -100,10 +100,10 @@ def default_replay(source: Path, *, overwrite: bool = False) -> Path:
 
 
 def mission_of_bag(path: Path, remap: Mapping[str, str], overrides: Iterable[str], name: str | None) -> Mission:
-    """The mission for a replay: a named one, else the one in the recording, else the default.
+    """The mission for a replay: a named one, else the one in the recording.
 
     Raises:
-        MissionError: it is wrong.
+        MissionError: it is wrong, or there is none.
         BagError: the recording cannot be read.
     """
     if name is not None:
@@ -112,9 +112,7 @@ def mission_of_bag(path: Path, remap: Mapping[str, str], overrides: Iterable[str
         text = reader.mission_text
     if text is not None:
         return mission_from_text(text, f"{path}: embedded mission", overrides)
-    mission = default_mission()
-    overrides = list(overrides)
-    return mission.with_overrides(overrides) if overrides else mission
+    raise MissionError(f"{path}: holds no mission; whose cells and orbit are these? --mission NAME says it")
 
 
 def replay(

@@ -11,7 +11,7 @@ from css_bringup.flight_changes import ParameterChange, RecordedSetting, setting
 from css_bringup.retracing import Given, Retrace
 from css_common.component import Input, Output
 from css_common.matching import Matcher
-from css_common.mission import SHARED, Event, Mission, Node, find_component
+from css_common.mission import Event, Mission, Node, find_component
 from css_common.schema import shaped_values
 from css_common.stepping import Stepper
 from css_recording.bag_metadata import absolute
@@ -142,14 +142,10 @@ def replayed(
         MissionError: the estimator or one of its parameters is unknown.
     """
     base = _node(mission, request.kind)
-    own = base or mission.node_of(find_component(ESTIMATORS, request.kind, "replay"), request.kind)
-    node = _changed(mission, own, request.changes) if request.changes else own
+    node = _node_with(mission, base, request)
     flown = _node(flown_mission, request.kind)
     changed = ",".join(f"{key}={value}" for key, value in request.changes.items() if key != "use_gyro")
     run = Replayed(request.label, changed, node, flown, mission.epoch_ns)
-    if uses_orbit(node) and not any(key.startswith("orbit.") for key in node_keys(mission, node.name)):
-        remedy = f" ({request.label}:eclipse.source=sensors does without)" if hasattr(node.values, "eclipse") else ""
-        run.notes.append(f"orbit: {mission.origin} gives none, that of the defaults is used{remedy}")
     if base is None:
         return run
     pinned = {*request.changes, *(key.removeprefix(f"{base.name}.") for key in overridden)}
@@ -168,28 +164,19 @@ def replayed(
     return run
 
 
-def uses_orbit(node: Node) -> bool:
-    """Whether an estimator asks a model of the orbit: for the shadow, or for Sun and field along it."""
-    if "orbit" not in node.component.shared:
-        return False
-    eclipse = getattr(node.values, "eclipse", None)
-    return eclipse is None or eclipse.source != "sensors"
-
-
-def node_keys(mission: Mission, name: str) -> set[str]:
-    """Parameters that a mission gives for a node, its own and the shared ones."""
-    return {key for section in (SHARED, name) for key in mission.parameters.get(section, {})}
-
-
 def _node(mission: Mission, name: str) -> Node | None:
     return next((n for n in mission.nodes if n.name == name and n.package == ESTIMATORS), None)
 
 
-def _changed(mission: Mission, base: Node, changes: Mapping[str, str]) -> Node:
-    if all(n.name != base.name for n in mission.nodes):
-        nodes = [*mission.values.graph.nodes, f"{base.package}/{base.executable}:{base.name}"]
-        mission = mission.with_overrides([f"graph.nodes={','.join(nodes)}"])
-    return mission.with_overrides([f"{base.name}.{key}={value}" for key, value in changes.items()]).node(base.name)
+def _node_with(mission: Mission, base: Node | None, request: EstimatorRequest) -> Node:
+    """The node that is asked for: that of the mission, or one more, with what is to be changed."""
+    if base is not None:
+        changed = mission.with_node((base.package, base.executable, base.name), request.changes)
+        return changed.node(base.name) if request.changes else base
+    component = find_component(ESTIMATORS, request.kind, "replay")
+    if not request.changes:
+        return mission.node_of(component, request.kind)
+    return mission.with_node((ESTIMATORS, request.kind, request.kind), request.changes).node(request.kind)
 
 
 def _script_of(mission: Mission, node: str) -> list[tuple]:

@@ -6,14 +6,15 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+from css_common import sections
 from css_common.codec import Sample
 from css_common.epochs import parse_utc
 from css_common.readings import Readings
-from css_common.schema import Table, Values
+from css_common.schema import Table, Values, missing
 from css_common.sections import SECTIONS
 
 if TYPE_CHECKING:
@@ -152,6 +153,11 @@ class Component:
         return ()
 
     @classmethod
+    def needed(cls, values: Values) -> Iterable[str]:
+        """Names of parameters without a default that it cannot do without; they have an example in their table."""
+        return ()
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         """What is wrong between parameters, one message each."""
         return ()
@@ -214,3 +220,15 @@ class Plant(Component):
         At the end it sets `finished`; what it returns with that is not sent, for nobody would answer it.
         """
         raise NotImplementedError
+
+
+def missing_values(component_type: type[Component], values: Values) -> Iterator[str]:
+    """What a component needs and has not been given, one message each."""
+    return missing(component_type.table(), values, component_type.needed(values))
+
+
+def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:
+    """What is wrong between the values of a component; what is missing comes first, for the rest builds on it."""
+    yield from missing_values(component_type, values)
+    yield from sections.conflicts(values)
+    yield from component_type.conflicts(values)

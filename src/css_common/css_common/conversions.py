@@ -22,3 +22,13 @@ def sine_of_degrees(angle_deg: float) -> float:
 def cosine_of_degrees(angle_deg: float) -> float:
     """Cosine of an angle [deg]."""
     return math.cos(math.radians(angle_deg))
+
+
+def seconds(time_us: float) -> float:
+    """Time [s] of a time [us]."""
+    return 1e-6 * time_us
+
+
+def tesla(field_nt: float) -> float:
+    """Field [T] of a field [nT]."""
+    return field_nt * 1e-9

@@ -16,7 +16,7 @@ from typing import Any
 
 from css_common import sections
 from css_common.codec import type_name
-from css_common.component import Component, Input, Output, Plant
+from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
 from css_common.epochs import parse_utc
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
@@ -51,7 +51,6 @@ __all__ = [
     "Mission",
     "MissionError",
     "Node",
-    "default_mission",
     "find_component",
     "find_mission",
     "load_mission",
@@ -88,7 +87,7 @@ class Node:
 
 
 class Mission:
-    """A validated mission. Use `load_mission` or `default_mission`.
+    """A validated mission. Use `load_mission`.
 
     Attributes:
         remarks: what is right but may not be what was meant, one line each.
@@ -100,6 +99,7 @@ class Mission:
         parameters: dict[str, dict[str, Any]],
         namespace: str = "/",
         guest: tuple[str, type[Component]] | None = None,
+        alone: bool = False,
     ) -> None:
         """Validates all sections.
 
@@ -108,6 +108,7 @@ class Mission:
             parameters: section name to flat parameter names and raw values.
             namespace: of its nodes.
             guest: name and component of a node beside the graph, which may have a section, too.
+            alone: the guest is all there is, and may be given what it needs in another way: nothing is asked for here.
 
         Raises:
             MissionError: naming the file, section, key, value and what was expected.
@@ -115,6 +116,7 @@ class Mission:
         self.origin = origin
         self.parameters = parameters
         self.namespace = namespace
+        self._alone = alone
         given = shared_by_all(parameters, namespace)
         shared = {key: value for key, value in given.items() if key in _SHARED_NAMES}
         with _naming(origin, SHARED):
@@ -221,16 +223,37 @@ class Mission:
             key, separator, text = override.partition("=")
             if not separator:
                 raise MissionError(f"{shown(override)} is no override, expected KEY=VALUE")
-            key = key.strip()
-            node, specification = self._find(key)
-            try:
-                value = replace(specification, name=key).parse(text)  # errors name it as it was typed
-            except ParameterError as error:
-                raise MissionError(f"override {error}") from error
+            node, specification = self._find(key.strip())
+            value = _parsed(key.strip(), specification, text)
             if node is None:
-                parameters = with_shared(parameters, key, value)
+                parameters = with_shared(parameters, key.strip(), value)
             else:
                 parameters = with_own(parameters, node, specification.name, value)
+        return self._with(parameters)
+
+    def with_node(self, node: tuple[str, str, str], changes: Mapping[str, str]) -> "Mission":
+        """The mission with a node in its graph, there or not, and texts of parameters of its own applied.
+
+        Args:
+            node: its package, executable and name.
+            changes: parameter to text.
+
+        Raises:
+            MissionError: as `with_overrides`.
+        """
+        package, executable, name = node
+        parameters: Sections = self.parameters
+        if all(known.name != name for known in self.nodes):
+            entries = [*self.values.graph.nodes, f"{package}/{executable}:{name}"]
+            parameters = with_shared(parameters, "graph.nodes", entries)
+        table = {p.name: p for p in find_component(package, executable, self.origin).table()}
+        for key, text in changes.items():
+            if key not in table:
+                raise MissionError(f"override {name}.{unknown_name(key, table)}")
+            parameters = with_own(parameters, name, key, _parsed(f"{name}.{key}", table[key], text))
+        return self._with(parameters)
+
+    def _with(self, parameters: Sections) -> "Mission":
         return Mission(self.origin, {name: dict(flat) for name, flat in parameters.items()}, self.namespace)
 
     def text(self) -> str:
@@ -300,8 +323,8 @@ class Mission:
         with _naming(self.origin, name):
             canonical = checked_values(table, {key: value for key, value in given.items() if key in names})
             values = shaped_values(table, canonical)
-            _refuse(sections.conflicts(values))
-            _refuse(component.conflicts(values))
+            if not (self._alone and any(missing_values(component, values))):
+                _refuse(all_conflicts(component, values))
         return Node(name, package, executable, component, canonical, values)
 
     def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
@@ -350,6 +373,13 @@ class Mission:
                 )
 
 
+def _parsed(key: str, specification: Parameter, text: str) -> Any:
+    try:
+        return replace(specification, name=key).parse(text)  # errors name it as it was typed
+    except ParameterError as error:
+        raise MissionError(f"override {error}") from error
+
+
 @contextmanager
 def _naming(origin: str, section: str) -> Iterator[None]:
     """Puts file and section in front of what is wrong."""
@@ -389,8 +419,3 @@ def mission_from_text(text: str, origin: str, overrides: Iterable[str] = ()) -> 
 def _changed(mission: Mission, overrides: Iterable[str]) -> Mission:
     overrides = list(overrides)
     return mission.with_overrides(overrides) if overrides else mission
-
-
-def default_mission() -> Mission:
-    """The mission of all defaults, used by a node that is started without a file."""
-    return Mission("defaults", {})

@@ -21,13 +21,21 @@ from css_common.parameter_sections import (
     merged_files,
     shared_by_all,
 )
-from css_common.schema import ParameterError, default_values, nearest, shown, unknown_name
-from css_common.sections import GRAPH, SECTIONS
+from css_common.schema import ParameterError, nearest, shown, unknown_name
+from css_common.sections import SECTIONS
 
 _NAMING = re.compile(r"(?:(\w+):)?__(node|name|ns):=(.*)", re.DOTALL)
 _NODE = re.compile(r"[A-Za-z]\w*", re.ASCII)
 _NAMESPACE = re.compile(r"/|(/[A-Za-z_]\w*)+", re.ASCII)
 _LONGEST_NAME = 100
+USUAL_GRAPH = (
+    "css_sim/dynamics",
+    "css_sim/css_array",
+    "css_sim/gyro",
+    "css_estimation/ekf",
+    "sunpoint_control/mrp_control",
+)
+"""What a node takes to be around it that is started without a mission."""
 _SHARED_NAMES = frozenset(p.name for table in SECTIONS.values() for p in table)
 
 
@@ -102,11 +110,12 @@ def mission_of_arguments(component_type: type[Component], arguments: Iterable[st
     files = [(file, sections_of_file(file)) for file in given.files]
     sections = merged_files(read for _, read in files)
     origin = ", ".join(given.files) or "defaults"
-    if "graph.nodes" in shared_by_all(sections, given.namespace):
+    alone = "graph.nodes" not in shared_by_all(sections, given.namespace)
+    if not alone:
         sections = dict(_of_graph(sections, given, origin))
     else:
         sections = _of_one_node(component_type, sections, given, origin)
-    mission = Mission(origin, sections, given.namespace, (given.name, component_type))
+    mission = Mission(origin, sections, given.namespace, (given.name, component_type), alone)
     mission.remarks += tuple(_for_another_namespace(files, given))
     return mission
 
@@ -148,7 +157,7 @@ def _of_graph(sections: Sections, given: NodeArguments, origin: str) -> Iterator
 def _of_one_node(
     component_type: type[Component], sections: Sections, given: NodeArguments, origin: str
 ) -> dict[str, dict[str, Any]]:
-    """What parameter files hold for a node that is started by itself, in the default graph with this node in it."""
+    """What parameter files hold for a node that is started by itself, in the usual graph with this node in it."""
     own = {p.name for p in component_type.table()}
     for section, parameters in sections.items():
         if not is_for(section, given.name, given.namespace):
@@ -169,9 +178,9 @@ def _of_one_node(
 
 
 def _graph_with(component_type: type[Component], name: str) -> dict[str, list[str]]:
-    """The default graph with a node in it. A node of another package knows nothing of it and stands by itself."""
+    """The usual graph with a node in it. A node of another package knows nothing of it and stands by itself."""
     package, _, executable = component_type.__module__.partition(".nodes.")
-    nodes = default_values(GRAPH).graph.nodes
+    nodes = list(USUAL_GRAPH)
     if not any(entry.startswith(f"{package}/") for entry in nodes):
         nodes = []
     if not any(entry.replace(":", "/").rpartition("/")[2] == name for entry in nodes):

@@ -64,7 +64,7 @@ def _examples(component_type: type[Component], inputs: tuple[Input, ...], output
 
 def _parameter(p: Parameter) -> Iterator[str]:
     yield f"  {'*' if p.tunable else ' '}{p.name} = {_shown(p)}"
-    yield f"      {p.description}; {p.expectation()}"
+    yield f"      {p.description}; {p.expectation()}" + (f"; for instance {p.example}" if p.example else "")
 
 
 def _shown(p: Parameter) -> str:

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import groupby
 
-from css_common.component import Component, Finding
+from css_common.component import Component, Finding, missing_values
 from css_common.mission import SHARED, Mission, Node
 from css_common.mission_file import MissionError
 from css_common.schema import shaped_values
@@ -36,6 +36,8 @@ def preflight(mission: Mission, component: type[Component] | None = None) -> lis
         for node in graph.values():
             if component is not None and node.component is not component:
                 continue
+            if any(missing_values(node.component, node.values)):
+                continue  # the node itself asks for it
             for finding in node.component.preflight(node, graph):
                 line = _line(mission, node, finding)
                 if finding.refused:

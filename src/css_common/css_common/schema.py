@@ -9,7 +9,7 @@ Arrays of rows are flat in a file (ROS parameters know no matrices) and come out
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from operator import attrgetter
 from types import SimpleNamespace
@@ -46,6 +46,7 @@ class Parameter(Generic[T]):
     length: int | None = None
     columns: int | None = None
     tunable: bool = False
+    example: str = ""  # what a file may say, of a parameter that has no default but an empty one
 
     @property
     def is_array(self) -> bool:
@@ -103,6 +104,8 @@ class Parameter(Generic[T]):
             raise TypeError
         single = {"reals": "real", "integers": "integer", "texts": "text"}[self.kind]
         values = [self._scalar(single, item) for item in value]
+        if self.example and not values:
+            return values
         if (self.length is not None and len(values) != self.length) or (self.columns and len(values) % self.columns):
             raise ValueError(f"{self._size()}, not {len(values)}")
         return values
@@ -220,10 +223,10 @@ def flag(name: str, default: bool, description: str, *, tunable: bool = False) -
 
 
 def choice(
-    name: str, default: str, choices: tuple[str, ...], description: str, *, tunable: bool = False
+    name: str, default: str, choices: tuple[str, ...], description: str, *, tunable: bool = False, example: str = ""
 ) -> Parameter[str]:
-    """One of a few words."""
-    return Parameter(name, "choice", default, "-", description, choices=choices, tunable=tunable)
+    """One of a few words; with an `example` the default is that for none of them."""
+    return Parameter(name, "choice", default, "-", description, choices=choices, tunable=tunable, example=example)
 
 
 def text(name: str, default: str, description: str) -> Parameter[str]:
@@ -243,8 +246,12 @@ def reals(
     high: float | None = None,
     open_low: bool = False,
     tunable: bool = False,
+    example: str = "",
 ) -> Parameter[np.ndarray]:
-    """Several numbers: of a given `length`, or rows of `columns` each; bounds hold for each."""
+    """Several numbers: of a given `length`, or rows of `columns` each; bounds hold for each.
+
+    With an `example` there is no default: whoever needs the parameter asks for it, and none are its numbers till then.
+    """
     return Parameter(
         name,
         "reals",
@@ -257,6 +264,7 @@ def reals(
         length=length,
         columns=columns,
         tunable=tunable,
+        example=example,
     )
 
 
@@ -326,6 +334,17 @@ def default_values(table: Iterable[Parameter], **changes: Any) -> Values:
     table = tuple(table)
     given = {name.replace("__", "."): value for name, value in changes.items()}
     return shaped_values(table, checked_values(table, given))
+
+
+def missing(table: Iterable[Parameter], values: Values, needed: Iterable[str]) -> Iterator[str]:
+    """What is needed and has not been given, one message each, with an example."""
+    specifications = {p.name: p for p in table}
+    for name in needed:
+        p = specifications[name]
+        value = values[p]
+        if value == p.default if isinstance(value, str) else not np.size(value):
+            some = replace(p, choices=tuple(word for word in p.choices if word != p.default))
+            yield f"{name}: missing, expected {some.expectation()}, for instance {p.example}"
 
 
 def unknown_name(name: str, known: Iterable[str]) -> str:

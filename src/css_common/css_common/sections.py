@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mission sections that several nodes share, with the checks that one value alone cannot pass or fail.
 
-They stand under `/**` in a mission file. Defaults are the spacecraft and orbit of O'Keefe & Schaub 2013.
+They stand under `/**` in a mission file. Defaults are nobody's spacecraft: what no two have in common is empty until a
+mission says it, and components that need it ask for it (`Component.needed`).
 """
 
 import math
@@ -15,7 +16,6 @@ from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
 from css_common.schema import Table, Values, choice, flag, integer, real, reals, shown, text, texts
 
-_R = 0.7071067811865476
 _LAST_STAMP_NS = 2**31 * 1_000_000_000
 _NAME = re.compile(r"\w[\w !#$%&'()+,\-.;=@\[\]^`{}~]*")  # nothing that a file system takes for its own
 _LONGEST_NAME = 100  # [bytes] with what is added to it a file name of 255 bytes
@@ -23,7 +23,7 @@ _MOST_STEPS = 10**9
 _LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
 MISSION: Table = (
-    text("mission.name", "okeefe_2013", "name of the mission, as in the file name"),
+    text("mission.name", "unnamed", "name of the mission, as in the file name"),
     text("mission.description", "", "one line for reports"),
     text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step"),
     real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7),
@@ -33,11 +33,17 @@ MISSION: Table = (
 )
 
 ORBIT: Table = (
-    choice("orbit.source", "elements", ("elements", "tle", "ballistic"), "what defines the orbit"),
-    real("orbit.altitude", 400e3, "m", "semi-major axis above the equatorial radius", low=_LOWEST, high=1e9),
+    choice(
+        "orbit.source",
+        "none",
+        ("none", "elements", "tle", "ballistic"),
+        "what defines the orbit",
+        example="orbit: {source: elements, altitude: 400.0e+3, inclination_deg: 51.6}",
+    ),
+    real("orbit.altitude", 0.0, "m", "semi-major axis above the equatorial radius", low=0.0, high=1e9),
     real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9),
-    real("orbit.inclination_deg", 45.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
-    real("orbit.raan_deg", 60.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
+    real("orbit.inclination_deg", 0.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
+    real("orbit.raan_deg", 0.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
     real("orbit.argument_of_perigee_deg", 0.0, "deg", "argument of perigee", low=-360.0, high=360.0),
     real("orbit.true_anomaly_deg", 0.0, "deg", "true anomaly at the epoch", low=-360.0, high=360.0),
     flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
@@ -68,11 +74,12 @@ ORBIT: Table = (
 SPACECRAFT: Table = (
     reals(
         "spacecraft.inertia",
-        (10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75),
+        (),
         "kg m^2",
         "inertia matrix about the centre of mass, wheels included, row-major",
         length=9,
         columns=3,
+        example="spacecraft: {inertia: [10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75]}",
     ),
     reals("spacecraft.array_normal", (0.0, 0.0, 1.0), "-", "normal of the solar arrays in b", length=3),
 )
@@ -80,15 +87,16 @@ SPACECRAFT: Table = (
 CELLS: Table = (
     reals(
         "cells.normals",
-        tuple(v for z in (_R, -_R) for xy in ((_R, 0.0), (0.0, _R), (-_R, 0.0), (0.0, -_R)) for v in (*xy, z)),
+        (),
         "-",
         "outward normals of the coarse sun sensor cells in b, at most 32 rows of x, y, z",
         columns=3,
+        example="cells: {normals: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
     ),
-    real("cells.field_of_view_deg", 120.0, "deg", "full cone of view of a cell", low=1.0, high=180.0),
+    real("cells.field_of_view_deg", 180.0, "deg", "full cone of view of a cell", low=1.0, high=180.0),
     reals(
         "cells.clip_normal",
-        (0.0, 0.0, 1.0),
+        (0.0, 0.0, 0.0),
         "-",
         "normal of the body plane that hides the other half space from each cell; zeros: no such plane",
         length=3,
@@ -101,10 +109,11 @@ WHEELS: Table = (
     flag("wheels.fitted", True, "the spacecraft carries reaction wheels; without them it flies uncontrolled"),
     reals(
         "wheels.axes",
-        (0.0, _R, _R, 0.0, _R, -_R, _R, -_R, 0.0, -_R, -_R, 0.0),
+        (),
         "-",
         "spin axes of the reaction wheels in b, one row of x, y, z each",
         columns=3,
+        example="wheels: {axes: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
     ),
     real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True),
     real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0),
@@ -213,13 +222,7 @@ MEASURES: Table = (
 GRAPH: Table = (
     texts(
         "graph.nodes",
-        (
-            "css_sim/dynamics",
-            "css_sim/css_array",
-            "css_sim/gyro",
-            "css_estimation/ekf",
-            "sunpoint_control/mrp_control",
-        ),
+        (),
         "nodes of the graph as PACKAGE/EXECUTABLE, or PACKAGE/EXECUTABLE:NAME for a second one of a kind",
     ),
     text("graph.estimator", "ekf", "name of the Sun estimator that the control listens to"),
@@ -303,11 +306,12 @@ def conflicts(values: Values) -> Iterator[str]:
     if hasattr(values, "spacecraft"):
         yield from _spacecraft_conflicts(values.spacecraft)
     if hasattr(values, "cells"):
-        yield from _unit_rows("cells.normals", values.cells.normals, 1, 32)
+        if len(values.cells.normals):
+            yield from _unit_rows("cells.normals", values.cells.normals, 1, 32)
         clip = np.linalg.norm(values.cells.clip_normal)
         if clip != 0.0 and abs(clip - 1.0) > 1e-6:
             yield f"cells.clip_normal: length {clip:.6g} given, expected a unit vector or zeros"
-    if hasattr(values, "wheels"):
+    if hasattr(values, "wheels") and len(values.wheels.axes):
         yield from _unit_rows("wheels.axes", values.wheels.axes, 3, 32)
         rank = np.linalg.matrix_rank(values.wheels.axes) if values.wheels.axes.size else 0
         if rank < 3:
@@ -353,6 +357,11 @@ def _orbit_conflicts(orbit: Values) -> Iterator[str]:
         for key in ("tle_line1", "tle_line2"):
             if len(getattr(orbit, key)) != 69:
                 yield f"orbit.{key}: expected the 69 characters of a two-line element set"
+    if orbit.source != "elements":
+        return
+    if orbit.altitude < _LOWEST:
+        given = f"{orbit.altitude:g} given" if orbit.altitude else "missing"
+        yield f"orbit.altitude: {given}, expected a number [m], at least {_LOWEST:g}, for instance 400.0e+3"
         return
     axis = EARTH_RADIUS + orbit.altitude
     perigee = axis * (1.0 - orbit.eccentricity) - EARTH_RADIUS
@@ -365,7 +374,14 @@ def _orbit_conflicts(orbit: Values) -> Iterator[str]:
 
 
 def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:
-    inertia = spacecraft.inertia
+    if len(spacecraft.inertia):
+        yield from _inertia_conflicts(spacecraft.inertia)
+    length = np.linalg.norm(spacecraft.array_normal)
+    if abs(length - 1.0) > 1e-6:
+        yield f"spacecraft.array_normal: length {length:.6g} given, expected a unit vector"
+
+
+def _inertia_conflicts(inertia: np.ndarray) -> Iterator[str]:
     if not np.allclose(inertia, inertia.T, rtol=1e-12, atol=0.0):
         yield "spacecraft.inertia: not symmetric, expected a symmetric positive definite matrix"
         return
@@ -377,9 +393,6 @@ def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:
             f"spacecraft.inertia: principal moments {', '.join(f'{m:.6g}' for m in moments)} break the triangle "
             "inequality, no rigid body has them"
         )
-    length = np.linalg.norm(spacecraft.array_normal)
-    if abs(length - 1.0) > 1e-6:
-        yield f"spacecraft.array_normal: length {length:.6g} given, expected a unit vector"
 
 
 def _payload_conflicts(payload: Values) -> Iterator[str]:

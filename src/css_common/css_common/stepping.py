@@ -11,9 +11,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from css_common import sections
 from css_common.codec import Codec, Sample, codec_of
-from css_common.component import Component, Outgoing, Received
+from css_common.component import Component, Outgoing, Received, all_conflicts
 from css_common.mission import Event
 from css_common.schema import ParameterError, shaped_values
 
@@ -37,7 +36,7 @@ def first_step(event: Event, period_ns: int) -> int:
 def conflict(component_type: type[Component], canonical: Mapping[str, Any]) -> str | None:
     """The first thing that is wrong between values that are each sane, or None."""
     values = shaped_values(component_type.table(), canonical)
-    return next((reason for reason in (*sections.conflicts(values), *component_type.conflicts(values))), None)
+    return next(all_conflicts(component_type, values), None)
 
 
 class Port(NamedTuple):

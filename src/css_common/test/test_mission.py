@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a mission file means: sections over sections, overrides, the graph, awaited topics, events, criteria, text."""
 
-import math
-
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from css_common import sections
 from css_common.component import Plant
-from css_common.mission import default_mission, find_component, mission_from_text
-from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
+from css_common.mission import find_component, mission_from_text
+from css_common.mission_file import dump_sections, flattened, read_sections
 from css_msgs.msg import CssVoltages, SunEstimate
 
 HEAD = """\
@@ -230,26 +226,3 @@ def test_every_value_is_read_as_it_was_written(parameters):
     for section, flat in parameters.items():
         for name, value in flat.items():
             assert type(found[section][name]) is type(value)
-
-
-def test_default_mission_is_whole():
-    # flies nodes of other packages when they are there; its shared sections stand alone
-    try:
-        mission = default_mission()
-    except MissionError as error:
-        assert "in this workspace" in str(error)
-    else:
-        assert mission.name == "okeefe_2013"
-        assert mission.plant is not None
-
-
-def test_default_spacecraft_is_that_of_the_paper():
-    # O'Keefe & Schaub 2013, Section V: eight cells in two pyramids, 45 deg up and down, four wheels
-    normals = sections.CELLS[0].shaped(sections.CELLS[0].default)
-    assert normals.shape == (8, 3)
-    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-15)
-    np.testing.assert_allclose(np.abs(normals[:, 2]), math.sqrt(0.5))
-    assert sorted(np.sign(normals[:, 2])) == [-1.0] * 4 + [1.0] * 4
-    specification = next(p for p in sections.WHEELS if p.name == "wheels.axes")
-    axes = specification.shaped(specification.default)
-    np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, atol=1e-15)

@@ -14,9 +14,8 @@ from rclpy.qos import qos_profile_sensor_data
 from css_common import node_process
 from css_common.codec import codec_of
 from css_common.mission import find_component, mission_from_text
+from css_common.node_arguments import USUAL_GRAPH
 from css_common.node_process import mission_of_arguments
-from css_common.schema import default_values
-from css_common.sections import GRAPH
 from css_common.stop_signal import StopSignal
 from css_common.testing import DEADLINE, Bench
 from css_msgs.msg import CssVoltages, SunEstimate
@@ -291,8 +290,8 @@ def test_node_of_another_package_without_a_file_stands_by_itself():
     assert mission.node("second").component is component
 
 
-def test_node_of_the_default_graph_without_a_file_has_that_graph_around_it():
-    graph = default_values(GRAPH).graph.nodes
+def test_node_of_the_usual_graph_without_a_file_has_that_graph_around_it():
+    graph = USUAL_GRAPH
     package, _, executable = graph[0].partition("/")
     component = find_component(package, executable)
     assert len(mission_of_arguments(component, []).nodes) == len(graph)

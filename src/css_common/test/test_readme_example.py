@@ -22,7 +22,9 @@ def example(tmp_path, monkeypatch):
     nodes.mkdir(parents=True)
     (nodes / "brightest_cell.py").write_text(code, encoding="utf-8")
     monkeypatch.syspath_prepend(tmp_path)
-    return mission_from_text("/**: {ros__parameters: {graph: {nodes: [my_package/brightest_cell]}}}", "readme")
+    return mission_from_text(
+        "/**: {ros__parameters: {extends: okeefe_2013, graph: {nodes: [my_package/brightest_cell]}}}", "readme"
+    )
 
 
 def test_example(bench, example):

@@ -19,6 +19,7 @@ from css_common.schema import (
     flag,
     integer,
     integers,
+    missing,
     nested,
     real,
     reals,
@@ -208,22 +209,28 @@ def test_shared_names_are_unique_and_stand_in_their_section():
         assert all(p.name.startswith(f"{section}.") or p.name == "autostart" for p in table)
 
 
+ORBIT = {"orbit__source": "elements", "orbit__altitude": 400e3}
 CONFLICTS = [
+    ("orbit", {"orbit__source": "elements"}, "orbit.altitude: missing, expected a number [m], at least 100000"),
+    ("orbit", {**ORBIT, "orbit__altitude": 5e4}, "orbit.altitude: 50000 given, expected a number [m], at least 100000"),
     ("mission", {"mission__epoch": "tomorrow"}, "mission.epoch: 'tomorrow' is not a UTC instant"),
     ("mission", {"mission__epoch": "1969-12-31T00:00:00Z"}, "mission.epoch: "),
     ("mission", {"mission__epoch": "2038-01-19T03:00:00Z"}, "mission.epoch: "),
     ("orbit", {"orbit__source": "tle"}, "orbit.tle_line1: expected the 69 characters"),
-    ("orbit", {"orbit__eccentricity": 0.5}, "orbit.eccentricity: 0.5 given, which with orbit.altitude 400000 m puts"),
-    ("orbit", {"orbit__eccentricity": 0.05}, "at 61 km; expected at most 0.0442, a perigee of 100 km"),
+    (
+        "orbit",
+        {**ORBIT, "orbit__eccentricity": 0.5},
+        "0.5 given, which with orbit.altitude 400000 m puts",
+    ),
+    ("orbit", {**ORBIT, "orbit__eccentricity": 0.05}, "at 61 km; expected at most 0.0442, a perigee of 100 km"),
     ("spacecraft", {"spacecraft__inertia": [1.0, 0.1, 0, 0, 1, 0, 0, 0, 1]}, "spacecraft.inertia: not symmetric"),
     ("spacecraft", {"spacecraft__inertia": [1.0, 0, 0, 0, -1, 0, 0, 0, 1]}, "spacecraft.inertia: eigenvalue -1 given"),
     ("spacecraft", {"spacecraft__inertia": [1.0, 0, 0, 0, 1, 0, 0, 0, 3]}, "break the triangle inequality"),
     ("spacecraft", {"spacecraft__array_normal": [0, 0, 0.5]}, "spacecraft.array_normal: length 0.5 given"),
-    ("cells", {"cells__normals": []}, "cells.normals: 0 rows given, expected 1 to 32"),
     ("cells", {"cells__normals": [1, 0, 0] * 33}, "cells.normals: 33 rows given, expected 1 to 32"),
     ("cells", {"cells__normals": [1, 0, 0, 0, 2, 0]}, "cells.normals: row 1 has length 2"),
     ("cells", {"cells__clip_normal": [0, 0, 0.1]}, "cells.clip_normal: length 0.1 given"),
-    ("wheels", {"wheels__axes": []}, "wheels.axes: 0 rows given, expected 3 to 32"),
+    ("wheels", {"wheels__axes": [1, 0, 0, 0, 1, 0]}, "wheels.axes: 2 rows given, expected 3 to 32"),
     ("wheels", {"wheels__axes": [1, 0, 0, 0, 1, 0, 0, -1, 0]}, "wheels.axes: they span 2 of 3 directions"),
     ("rods", {"rods__axes": [1, 1, 0]}, "rods.axes: row 0 has length 1.41421"),
     ("io", {"io__body_frame": "b" * 256}, "io.body_frame: "),
@@ -250,6 +257,19 @@ def test_specifications_cannot_change():
 
 
 def test_a_spacecraft_without_wheels_has_no_axes():
-    fitted, bare = (default_values(sections.WHEELS, wheels__fitted=word) for word in (True, False))
-    assert sections.wheel_axes(fitted).shape == (4, 3)
+    axes = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    fitted, bare = (default_values(sections.WHEELS, wheels__fitted=word, wheels__axes=axes) for word in (True, False))
+    assert sections.wheel_axes(fitted).shape == (3, 3)
     assert sections.wheel_axes(bare).shape == (0, 3)
+
+
+def test_what_has_no_default_is_missing_until_it_is_given():
+    table = (reals("rows", (), "-", "rows", columns=2, length=4, example="rows: [1.0, 0.0, 0.0, 1.0]"), GAIN)
+    assert default_values(table).rows.shape == (0, 2)
+    (line,) = missing(table, default_values(table), ["rows"])
+    assert line.startswith(
+        "rows: missing, expected a list of numbers written with points, 4 values, for instance rows: ["
+    )
+    assert list(missing(table, default_values(table, rows=[1.0, 2.0, 3.0, 4.0]), ["rows"])) == []
+    with pytest.raises(ParameterError, match="4 values, not 2"):
+        default_values(table, rows=[1.0, 2.0])

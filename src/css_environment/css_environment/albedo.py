@@ -16,7 +16,7 @@ attitudes and places 300 to 1000 km high, terminator included (full scale is 1, 
     the same with 0.3 everywhere                                                  0.0020    0.0007
     faces of a box, 180 deg full view, no plane; zonal means                      0.0004    0.0001
     the same with each 5 deg grid cell drawn for itself                           0.0028    0.0007
-    three in a collar of 28 to 44.9 deg, 166 deg full view; zonal means           0.0043    0.0007
+    three behind an edge of 28 to 44.9 deg, 166 deg view;   zonal means           0.0043    0.0007
 
 Errors are in proportion to the reflectivity. Eight cells take 0.16 us on one 2.5 GHz core.
 """
@@ -56,7 +56,7 @@ _NARROWEST_SIN = 0.05
 
 
 class Screen(NamedTuple):
-    """Structure that hides part of the sky from cells: a body plane, or the collar of a group of cells.
+    """Structure that hides part of the sky from cells: all beyond an angle to an axis.
 
     A cell whose `side` is positive receives all of the light from directions whose cosine to the axis is at least
     `full_cos`, none below `dark_cos`, a linear part between. If `side` is negative the axis is mirrored; if zero
@@ -74,8 +74,8 @@ def plane_screen(normal_b) -> Screen:
     return Screen((x, y, z), 0.0, 0.0)
 
 
-def collar_screen(axis_b, full_angle: float, dark_angle: float) -> Screen:
-    """Collar about an axis: all light within `full_angle` [rad] of it, none beyond `dark_angle`."""
+def soft_screen(axis_b, full_angle: float, dark_angle: float) -> Screen:
+    """Screen with a linear edge: all light within `full_angle` [rad] of an axis, none beyond `dark_angle`."""
     x, y, z = (float(c) for c in axis_b)
     return Screen((x, y, z), math.cos(dark_angle), math.cos(full_angle))
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from css_environment.albedo import Screen, albedo_output, collar_screen, new_workspace, plane_screen, transmission
+from css_environment.albedo import Screen, albedo_output, new_workspace, plane_screen, soft_screen, transmission
 from css_environment.constants import EARTH_RADIUS
 from css_environment.earth_light import (
     DISC,
@@ -165,7 +165,7 @@ def test_what_a_screen_passes_of_a_point_source():
     assert [transmission(plane, side, up) for side in (1.0, -1.0, 0.0)] == [1.0, 0.0, 1.0]
     assert [transmission(plane, side, down) for side in (1.0, -1.0, 0.0)] == [0.0, 1.0, 1.0]
     assert transmission(NO_SCREEN, 1.0, down) == 1.0
-    collar = collar_screen((0.0, 0.0, 1.0), math.radians(28.0), math.radians(44.9))
+    collar = soft_screen((0.0, 0.0, 1.0), math.radians(28.0), math.radians(44.9))
     assert transmission(collar, 1.0, (math.sin(0.48), 0.0, math.cos(0.48))) == 1.0
     assert transmission(collar, 1.0, (math.sin(0.79), 0.0, math.cos(0.79))) == 0.0
     middle = 0.5 * (collar.full_cos + collar.dark_cos)

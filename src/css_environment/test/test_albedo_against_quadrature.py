@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from css_common.random_streams import random_key
-from css_environment.albedo import albedo_output, collar_screen, new_workspace, plane_screen
+from css_environment.albedo import albedo_output, new_workspace, plane_screen, soft_screen
 from css_environment.constants import EARTH_RADIUS
 from css_environment.earth_light import albedo_sources, new_earth_view, new_light
 from css_environment.reflectivity import draw_reflectivity, zonal_reflectivity
@@ -33,7 +33,7 @@ LAYOUTS = {
     "three cells in a collar": (
         COLLARED,
         np.ones(3),
-        collar_screen(COLLAR_AXIS, math.radians(28), math.radians(44.9)),
+        soft_screen(COLLAR_AXIS, math.radians(28), math.radians(44.9)),
         166.0,
         0.01,
     ),

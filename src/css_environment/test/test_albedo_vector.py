@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from css_environment.albedo import albedo_output, collar_screen, new_workspace, plane_screen, transmission
+from css_environment.albedo import albedo_output, new_workspace, plane_screen, soft_screen, transmission
 from css_environment.albedo_vector import MODELS, albedo_vector, earth_light_sources, lit_cap, nadir_vector
 from css_environment.constants import EARTH_RADIUS
 from css_environment.earth_light import new_earth_view, new_light
@@ -113,7 +113,7 @@ def test_nadir_model_is_constant_in_sunlight():
 def test_cells_receive_the_vector_through_view_and_collar(model):
     """The one patch of light gives each cell the cosine law, cut by its collar as a point source is."""
     rng = np.random.default_rng(3)
-    screen = collar_screen((0.0, 0.0, -1.0), math.radians(28.0), math.radians(44.9))
+    screen = soft_screen((0.0, 0.0, -1.0), math.radians(28.0), math.radians(44.9))
     cells = np.zeros(40, CELL)
     normals = rng.normal(size=(40, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)

@@ -105,7 +105,8 @@ def test_no_text_passes_for_a_set_and_none_makes_the_checks_crash(text, place, c
 
 def values(**changes):
     table = (*MISSION, *ORBIT)
-    canonical = {p.name: p.default for p in table} | changes
+    circle = {"orbit.source": "elements", "orbit.altitude": 400e3}
+    canonical = {p.name: p.default for p in table} | circle | changes
     return shaped_values(table, canonical)
 
 

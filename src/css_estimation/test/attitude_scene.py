@@ -2,11 +2,11 @@
 """A tumbling spacecraft with Gaussian sensors, in plain Python, for tests of the attitude filter."""
 
 import numpy as np
+from okeefe_spacecraft import okeefe_values
 from scipy.spatial.transform import Rotation
 
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import typed_call
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_estimation.attitude import attitude_ekf, attitude_options, attitude_solution, flight_references
 from css_estimation.attitude.flight_references import References
@@ -21,7 +21,7 @@ _step = typed_call(attitude_ekf.step)
 def options(normals=FACES, **changes):
     """Parameters of a filter for cells of half the sky."""
     return attitude_options.parameters(
-        default_values(
+        okeefe_values(
             TABLE,
             cells__normals=np.asarray(normals, dtype=float).ravel().tolist(),
             cells__field_of_view_deg=180.0,

@@ -4,10 +4,10 @@
 import numpy as np
 import pytest
 from attitude_scene import FACES
+from okeefe_spacecraft import okeefe_values
 from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
-from css_common.schema import default_values
 from css_estimation.attitude.flight_references import FlightReferences
 from css_estimation.messages import field_reading
 from css_estimation.nodes.attitude_filter import AttitudeFilter
@@ -18,7 +18,7 @@ DCM = np.array([[0.36, 0.48, -0.8], [-0.8, 0.6, 0.0], [0.48, 0.64, 0.6]])
 
 def values_of(**changes):
     changes.setdefault("cells__normals", FACES.ravel().tolist())
-    return default_values(
+    return okeefe_values(
         AttitudeFilter.table(), cells__field_of_view_deg=180.0, cells__clip_normal=[0.0, 0.0, 0.0], **changes
     )
 

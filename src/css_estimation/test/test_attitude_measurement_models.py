@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import multiply
 from css_estimation.attitude import attitude_options, flight_references
@@ -32,7 +32,7 @@ def parameters(**changes):
     changes.setdefault("cells__normals", FACES)
     changes.setdefault("cells__field_of_view_deg", 180.0)
     changes.setdefault("cells__clip_normal", [0.0, 0.0, 0.0])
-    return attitude_options.parameters(default_values(TABLE, **changes))
+    return attitude_options.parameters(okeefe_values(TABLE, **changes))
 
 
 def direction(rng):

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from ideal_cells import AZIMUTH, POLAR, WEIGHT, direction, ideal_outputs, percent_of_sphere
+from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.kernel import outer_kernel
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
 from css_estimation.sun import least_squares as wls
@@ -26,7 +26,7 @@ R = math.sqrt(0.5)
 def parameters(normals=None, **changes):
     if normals is not None:
         changes |= {"cells__normals": np.ravel(normals).tolist()} | OPEN
-    return wls.parameters(default_values(CELLS + wls.PARAMETERS, **changes))
+    return wls.parameters(okeefe_values(CELLS + wls.PARAMETERS, **changes))
 
 
 def normals_of(p):

@@ -6,10 +6,10 @@ import math
 import numpy as np
 import pytest
 from listing import components, executable, settings_of
+from okeefe_spacecraft import okeefe_values
 from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
-from css_common.schema import default_values
 from css_estimation.messages import gyro_reading
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_estimation.sun.sun_heading import RATE_FIELD, RATE_GYRO, RATE_SUN
@@ -21,7 +21,7 @@ OMEGA = np.array([0.01, 0.0, -0.02])
 
 
 def values_of(kind, **changes):
-    return default_values(kind.table(), **(settings_of(kind, "cells", "spacecraft") | changes))
+    return okeefe_values(kind.table(), **(settings_of(kind, "cells", "spacecraft") | changes))
 
 
 def build(kind, **changes):

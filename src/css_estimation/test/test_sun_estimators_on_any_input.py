@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from listing import components, executable, settings_of
+from okeefe_spacecraft import okeefe_values
 
-from css_common.schema import default_values
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_estimation.sun.sun_heading import PREDICTION_SUNLIT, UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
 
@@ -40,7 +40,7 @@ def random_normals(count):
 def layouts(kind):
     """Cells by their number: at random, or those of its mission where it takes no others."""
     drawn = {count: {"cells__normals": random_normals(count)} for count in (1, 2, 8, 32)}
-    if any(kind.conflicts(default_values(kind.table(), **layout)) for layout in drawn.values()):
+    if any(kind.conflicts(okeefe_values(kind.table(), **layout)) for layout in drawn.values()):
         layout = settings_of(kind, "cells", "spacecraft")
         drawn = {len(layout["cells__normals"]) // 3: layout}
     return {count: {"cells__clip_normal": [0.0, 0.0, 0.0]} | layout for count, layout in drawn.items()}
@@ -60,7 +60,7 @@ BY_COUNT = pytest.mark.parametrize(
 
 
 def build(kind, count, **changes):
-    p = kind.algorithm.parameters(default_values(kind.table(), **(layouts(kind)[count] | changes)))
+    p = kind.algorithm.parameters(okeefe_values(kind.table(), **(layouts(kind)[count] | changes)))
     return p, kind.algorithm.initial_state(p)
 
 

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between, cross, multiply, norm, scale, subtract
 from css_estimation.sun import sunline_ekf, wavg
@@ -22,7 +22,7 @@ from css_estimation.sun.sun_heading import (
 )
 
 ESTIMATORS = pytest.mark.parametrize("estimator", [wavg, sunline_ekf], ids=["wavg", "ekf"])
-NORMALS = np.asarray(default_values(CELLS).cells.normals)
+NORMALS = np.asarray(okeefe_values(CELLS).cells.normals)
 DT = 0.1
 OMEGA = (0.004, -0.003, 0.0)
 
@@ -32,7 +32,7 @@ class Flight:
 
     def __init__(self, estimator, **changes):
         self.estimator = estimator
-        self.p = estimator.parameters(default_values(CELLS + estimator.PARAMETERS, **changes))
+        self.p = estimator.parameters(okeefe_values(CELLS + estimator.PARAMETERS, **changes))
         self.state = estimator.initial_state(self.p)
         self.sun_b = (0.0, 0.0, 1.0)
 

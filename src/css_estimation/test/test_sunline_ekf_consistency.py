@@ -11,10 +11,10 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from scipy.stats import chi2
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between, multiply, scale
 from css_estimation.sun import sunline_ekf
@@ -25,11 +25,11 @@ STEPS = 300
 DT = 0.1
 CELL_SIGMA = 0.03
 PROCESS_SIGMA = 0.01
-NORMALS = np.asarray(default_values(CELLS).cells.normals)
+NORMALS = np.asarray(okeefe_values(CELLS).cells.normals)
 
 
 def ekf(**changes):
-    p = sunline_ekf.parameters(default_values(CELLS + sunline_ekf.PARAMETERS, **changes))
+    p = sunline_ekf.parameters(okeefe_values(CELLS + sunline_ekf.PARAMETERS, **changes))
     return p, sunline_ekf.initial_state(p)
 
 

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
@@ -148,7 +148,7 @@ def test_symmetric_helpers(rng):
 
 
 def test_cells_used_are_the_predicted_and_the_bright_ones():
-    p = sunline_ekf.parameters(default_values(CELLS + sunline_ekf.PARAMETERS))
+    p = sunline_ekf.parameters(okeefe_values(CELLS + sunline_ekf.PARAMETERS))
     predicted_b = (0.0, 0.0, 1.0)  # all four cells of the +z side
     voltages = np.array([0.7, 0.7, 0.7, 0.0, 0.1, 0.5, 0.27, 0.29])
     prior = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)

@@ -10,9 +10,9 @@ import math
 import numpy as np
 import pytest
 from ideal_cells import AZIMUTH, POLAR, WEIGHT, direction, ideal_outputs, percent_of_sphere
+from okeefe_spacecraft import okeefe_values
 
 from css_common.kernel import kernel
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
 from css_estimation.sun import wavg
@@ -21,7 +21,7 @@ from css_estimation.sun.snapshot import MODE_NO_SUN
 
 
 def wavg_parameters(**changes):
-    return wavg.parameters(default_values(CELLS + wavg.PARAMETERS, **changes)).snapshot
+    return wavg.parameters(okeefe_values(CELLS + wavg.PARAMETERS, **changes)).snapshot
 
 
 @kernel
@@ -191,6 +191,6 @@ def test_normals_that_cancel_leave_no_direction():
 
 
 def test_layout_of_the_default_mission_is_the_dual_pyramid():
-    layout = cell_layout(default_values(CELLS))
+    layout = cell_layout(okeefe_values(CELLS))
     np.testing.assert_allclose(np.abs(layout.cells["nz"]), math.sqrt(0.5), rtol=1e-12)
     assert layout.cos_half_view == pytest.approx(0.5)

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of merit of each case, gathered while it flies; definitions as in `css_analysis.flight_metrics`."""
+"""Figures of merit of each case with a Sun estimator, gathered while it flies.
+
+Definitions are those of `css_analysis.flight_metrics`.
+"""
 
 import math
 from typing import NamedTuple
@@ -10,8 +13,9 @@ from css_analysis.estimate_errors import tangent_nees_of
 from css_analysis.flight_log import SUNLIT_FRACTION
 from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITIVE, Windows
 from css_common.kernel import kernel
-from css_common.vectors import Vec3, angle_between, norm, subtract
+from css_common.vectors import angle_between, norm, subtract
 from css_estimation.sun.sun_heading import VALIDITY_NONE, SunHeading
+from css_monte_carlo.step_truth import Truth
 
 REPORT_SPAN = 60.0
 """Time [s] before `Windows.report_time` over which rates are averaged."""
@@ -21,7 +25,7 @@ SUNLIT, FIRST_PASS, LATE, REPORTED, FINAL = 1, 2, 4, 8, 16
 
 BIN_DEG = 0.02
 """Width of the bins from which percentiles over time come."""
-_BINS = round(180.0 / BIN_DEG)
+BINS = round(180.0 / BIN_DEG)
 
 SAMPLED = ("heading_error_deg", "pointing_error_deg", "rate_deg_s", "rate_knowledge_deg_s")
 """Quantities whose percentiles over the cases are kept against time."""
@@ -71,6 +75,10 @@ TALLY = np.dtype(
 """Running sums of one case; angles in deg, rates in deg/s, momentum in N m s."""
 
 
+ESTIMATE_COLUMNS = 6
+"""Columns of a trace that hold the estimate: sun_b and omega_bn_b."""
+
+
 class Tallies(NamedTuple):
     """Running figures of C cases."""
 
@@ -90,7 +98,7 @@ def new_tallies(cases: int, steps: int, period_s: float, sample_every: int) -> T
     totals["acquired_step"] = -1
     return Tallies(
         totals,
-        np.zeros((cases, _BINS), np.int64),
+        np.zeros((cases, BINS), np.int64),
         np.zeros((cases, 2, acquire_steps + 1)),
         np.full((cases, len(SAMPLED), sample_count(steps, sample_every)), np.nan, np.float32),
         acquire_steps,
@@ -125,25 +133,24 @@ def step_marks(illumination: np.ndarray, period_s: float, windows: Windows) -> n
 
 
 @kernel
+def note_estimate(heading: SunHeading, attitude, out) -> None:
+    """Writes the `ESTIMATE_COLUMNS` of a trace."""
+    for i in range(3):
+        out[i], out[3 + i] = heading.sun_b[i], heading.omega_bn_b[i]
+
+
+@kernel
 def tally_step(
-    tallies: Tallies,
-    c: int,
-    step: int,
-    marks: int,
-    sun_b: Vec3,
-    omega_bn_b: Vec3,
-    array_normal_b: Vec3,
-    wheel_momentum_b: Vec3,
-    heading: SunHeading,
+    tallies: Tallies, c: int, step: int, marks: int, truth: Truth, heading: SunHeading, attitude, memory
 ) -> None:
     """Count one step of case `c`.
 
     Args:
         marks: of the step, see `step_marks`.
-        sun_b, omega_bn_b: true direction to the Sun and body rate [rad/s].
-        wheel_momentum_b: [N m s].
-        heading: what the estimator says.
+        heading: what the Sun estimator says.
+        attitude, memory: of an attitude filter, not read.
     """
+    sun_b, omega_bn_b = truth.sun_b, truth.omega_bn_b
     t = tallies.totals[c]
     sunlit = (marks & SUNLIT) != 0
     estimated = heading.validity != VALIDITY_NONE
@@ -151,7 +158,7 @@ def tally_step(
     if not sunlit:
         t.run = 0
     if sunlit or sampled:
-        pointing = _DEG * angle_between(sun_b, array_normal_b)
+        pointing = _DEG * angle_between(sun_b, truth.array_normal_b)
         error = _DEG * angle_between(heading.sun_b, sun_b) if estimated else math.nan
         if sunlit:
             _tally_sunlit(tallies, c, step, marks, pointing, error)
@@ -169,7 +176,7 @@ def tally_step(
     if heading.nis_dof > 0:
         t.innovations += heading.nis_dof
         t.nis_sum += heading.nis
-    t.momentum = norm(wheel_momentum_b)
+    t.momentum = norm(truth.wheel_momentum_b)
     t.momentum_max = max(t.momentum_max, t.momentum)
 
 
@@ -217,7 +224,7 @@ def _count(tallies, c, pointing, error) -> None:
     if not math.isnan(error):
         t.headings += 1
         t.heading_sum += error
-        tallies.histogram[c, min(int(error / BIN_DEG), _BINS - 1)] += 1
+        tallies.histogram[c, min(int(error / BIN_DEG), BINS - 1)] += 1
 
 
 @kernel

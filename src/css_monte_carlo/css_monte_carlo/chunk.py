@@ -1,21 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """A few cases of one configuration flown from start to end: the unit of work, of resuming and of distribution."""
 
+import os
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba.typed
 import numpy as np
+import pyarrow as pa
 
-from css_common.mission import Mission, mission_from_text
-from css_monte_carlo.case_tallies import Tallies, new_tallies
-from css_monte_carlo.loop import fly_block, trace_columns
+from css_analysis.flight_metrics import windows_of
+from css_common.mission import mission_from_text
+from css_monte_carlo.case_table import case_table
+from css_monte_carlo.loop import fly_block
+from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
+from css_monte_carlo.mission_parts import NoPlace
+from css_monte_carlo.stepped_flight import SteppedFlight
 from css_monte_carlo.study_folder import StudyError
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_sim.flight_checks import MotionError, check_rate
+
+_SHARE = 10  # cases that a thread flies at a time
 
 
 class ChunkTask(NamedTuple):
@@ -26,36 +35,49 @@ class ChunkTask(NamedTuple):
     first_case: int
     cases: int
     sample_every: int  # steps from sample to sample
+    estimator: str | None = None  # node whose estimates are measured; None: `graph.estimator`
+    guess_deg: float = 0.0  # of `MissionFlight.cases`
 
 
 class Flown(NamedTuple):
     """What the cases of a chunk gave."""
 
-    tallies: Tallies
-    trace: np.ndarray  # (C, steps, columns) of every step's values, see `loop.TRACE`; empty unless asked for
+    tallies: CaseTallies  # running sums of the measured estimator
+    trace: np.ndarray  # (C, steps, `MissionFlight.trace_columns`) of every step's values; empty unless asked for
     cpu_s: float  # processor time of the loop, without preparation
 
 
-def flown_task(task: ChunkTask) -> tuple[np.ndarray, Mission, Flown]:
-    """Case numbers, mission and flights of a task, in any process: they depend on nothing but the task."""
-    flight = _flight_of(task.mission_text, task.origin)
+def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
+    """Table of a task's cases, which depends on nothing but the task, and processor time [s] of its loop."""
+    flight = _flight_of(task.mission_text, task.origin, task.estimator)
     numbers = np.arange(task.first_case, task.first_case + task.cases)
-    return numbers, flight.mission, fly_cases(flight, numbers, task.sample_every)
+    if isinstance(flight, SteppedFlight):
+        tallies, cpu_s = flight.fly(numbers, task.sample_every)
+    else:
+        tallies, _, cpu_s = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
+    period_s = flight.mission.period_ns * 1e-9
+    return case_table(numbers, tallies, period_s, windows_of(flight.mission)), cpu_s
 
 
 @lru_cache(maxsize=2)
-def _flight_of(mission_text: str, origin: str) -> MissionFlight:
+def _flight_of(mission_text: str, origin: str, estimator: str | None) -> MissionFlight | SteppedFlight:
     # Tables of the environment, 1 kB a step, are worth keeping from chunk to chunk. Chunks come sorted by mission, so
     # that threads work on one or two.
-    return MissionFlight(mission_from_text(mission_text, origin))
+    mission = mission_from_text(mission_text, origin)
+    try:
+        return MissionFlight(mission, estimator)
+    except NoPlace:
+        return SteppedFlight(mission, estimator)
 
 
-def fly_cases(flight: MissionFlight, numbers: np.ndarray, sample_every: int, traced: bool = False) -> Flown:
-    """Flies cases (C,) of a mission, each independent of the others."""
-    cases, initial = flight.cases(numbers)
-    tallies = new_tallies(len(numbers), flight.steps, flight.mission.period_ns * 1e-9, sample_every)
-    columns = trace_columns(cases.wheel_momentum.shape[1])
-    trace = np.zeros((len(numbers), flight.steps, columns) if traced else (0, 0, 0))
+def fly_cases(
+    flight: MissionFlight, numbers: np.ndarray, sample_every: int, guess_deg: float = 0.0, traced: bool = False
+) -> Flown:
+    """Flies cases (C,) of a mission, each independent of the others; `guess_deg` as of `MissionFlight.cases`."""
+    cases, initial = flight.cases(numbers, guess_deg)
+    period_s = flight.mission.period_ns * 1e-9
+    tallies = flight.measure.new_tallies(len(numbers), flight.steps, period_s, sample_every, windows_of(flight.mission))
+    trace = np.zeros((len(numbers), flight.steps, flight.trace_columns) if traced else (0, 0, 0))
     states = numba.typed.List(initial)
     cpu_s = 0.0
     first = next(flight.stretches(cases))
@@ -71,6 +93,38 @@ def fly_cases(flight: MissionFlight, numbers: np.ndarray, sample_every: int, tra
             cpu_s += time.thread_time() - start
             _check_motion(flight, numbers, states, begin)
     return Flown(tallies, trace, cpu_s)
+
+
+def fly_in_threads(
+    flights: Sequence[MissionFlight],
+    cases: int,
+    *,
+    guess_deg: float = 0.0,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Any]:
+    """Tallies of cases 0 to `cases` - 1 of each flight, flown side by side, with a sample at every step.
+
+    Args:
+        guess_deg: as of `MissionFlight.cases`.
+        progress: told how many cases are done, and of how many.
+    """
+    numbers = [np.arange(first, min(first + _SHARE, cases)) for first in range(0, cases, _SHARE)]
+    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+        futures = [[pool.submit(fly_cases, flight, part, 1, guess_deg) for part in numbers] for flight in flights]
+        done, total = 0, cases * len(flights)
+        for of_flight in futures:
+            for part, future in zip(numbers, of_flight, strict=True):
+                future.result()
+                done += len(part)
+                if progress is not None:
+                    progress(done, total)
+    return [_joined([future.result().tallies for future in of_flight]) for of_flight in futures]
+
+
+def _joined(parts: Sequence[Any]) -> Any:
+    """Tallies of all cases of some, in their order."""
+    by_case = ("totals", "histogram", "samples")
+    return parts[0]._replace(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in by_case})
 
 
 def _check_motion(flight: MissionFlight, numbers: np.ndarray, states: Iterable, step: int) -> None:

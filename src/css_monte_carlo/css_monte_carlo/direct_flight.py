@@ -18,12 +18,15 @@ from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
 from css_common.stepping import Stepper
+from css_monte_carlo.mission_parts import is_attitude
 
 
 def configured(
     mission: Mission, *, case: int | None = None, estimator: str | None = None, gyro: bool = True
 ) -> Mission:
-    """A mission with another case, another estimator in the place of the one that flies, the gyro on or off.
+    """A mission with another case, another Sun estimator in the place of the one that flies, the gyro on or off.
+
+    An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then switched for it.
 
     Raises:
         MissionError: there is no such estimator.
@@ -31,24 +34,46 @@ def configured(
     if case is not None:
         mission = mission.with_overrides([f"mission.case={case}"])
     flown = mission.values.graph.estimator
-    if estimator is not None and estimator != flown:
-        present = any(node.name == estimator for node in mission.nodes)
-        entry = f"{mission.node(flown).package}/{estimator}"
-        nodes = [
-            entry if name == flown and not present else listed
-            for name, listed in zip((n.name for n in mission.nodes), mission.values.graph.nodes, strict=True)
-        ]
-        mission = mission.with_overrides([f"graph.nodes={','.join(nodes)}", f"graph.estimator={estimator}"])
-    name = mission.values.graph.estimator
+    name = flown if estimator is None else estimator
+    if name != flown and not is_attitude_filter(mission, name):
+        mission = _with_estimator(mission, name)
+    node = mission.node(name)
+    if gyro and all(parameter.name != "use_gyro" for parameter in node.component.table()):
+        return mission
     return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
 
 
+def is_attitude_filter(mission: Mission, name: str) -> bool:
+    """Whether a node of the graph estimates attitude."""
+    return any(node.name == name and is_attitude(node) for node in mission.nodes)
+
+
+def _with_estimator(mission: Mission, estimator: str) -> Mission:
+    """A mission in which another Sun estimator flies, from the graph or in the place of the one that flew."""
+    flown = mission.values.graph.estimator
+    names = [node.name for node in mission.nodes]
+    overrides = [f"graph.estimator={estimator}"]
+    if estimator not in names and flown in names:
+        entry = f"{mission.node(flown).package}/{estimator}"
+        nodes = [
+            entry if name == flown else listed for name, listed in zip(names, mission.values.graph.nodes, strict=True)
+        ]
+        overrides.insert(0, f"graph.nodes={','.join(nodes)}")
+    return mission.with_overrides(overrides)
+
+
 def fly_directly(mission: Mission) -> FlightLog:
-    """Flies a mission to its end; the log holds what a recording of the flight would.
+    """Flies a mission to its end, after the checks before a flight; the log holds what a recording of it would.
 
     Raises:
         MissionError: the mission has no plant, or its nodes wait for each other in a circle.
     """
+    report(preflight(mission))
+    return fly_checked(mission)
+
+
+def fly_checked(mission: Mission) -> FlightLog:
+    """As `fly_directly`, for a mission that has passed the checks before a flight."""
     steps = max(mission.steps, 1)
     wires: dict[str, _Wire | _Tape] = {
         topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=False)
@@ -68,6 +93,7 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
     Raises:
         MissionError: the mission has no plant or not these topics, or its nodes wait for each other in a circle.
     """
+    report(preflight(mission))
     kept = list(topics)
     for topic in kept:
         if topic not in mission.topics:
@@ -78,7 +104,6 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
 
 
 def _fly(mission: Mission, wires: "Wires") -> None:
-    report(preflight(mission))
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
     plant.stepper.apply_due(stamp_ns)

@@ -2,7 +2,8 @@
 """The compiled loop over cases and steps: sample sensors, estimate, control, propagate.
 
 Each of the four is the function that the node calls, with the values that the node would have from its topics, so
-that a case flies as on the graph, bit for bit.
+that a case flies as on the graph, bit for bit. A Sun estimator, an attitude filter and a control law fly if the mission
+has them (`dispatch_by_type`); without control the spacecraft flies free.
 """
 
 from typing import Any, NamedTuple
@@ -12,43 +13,31 @@ import numpy as np
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel, outer_kernel
 from css_common.random_streams import RandomKey
-from css_common.vectors import Mat3, Vec3, mat3, multiply
-from css_environment.albedo import albedo_output
+from css_common.vectors import Vec3, mat3, multiply
 from css_environment.albedo_vector import PATCHES, point_source
-from css_environment.earth_light import gather_light
-from css_environment.ephemeris import EnvironmentState
 from css_estimation.sun.sun_heading import Aiding
-from css_monte_carlo.case_tallies import Tallies, tally_step
-from css_monte_carlo.estimator_dispatch import estimate
-from css_monte_carlo.surroundings import Surroundings, state_at, view_at
-from css_sim import gyro, magnetometer, sun_cells
+from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
+from css_monte_carlo.step_truth import Truth
+from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
+from css_sim import gyro, magnetometer
 from css_sim.disturbances import Disturbances
-from css_sim.gyro import Gyro
-from css_sim.magnetometer import Magnetometer
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
+from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
 from css_sim.spacecraft import Spacecraft, advance
-from css_sim.sun_cells import SunCells
-from sunpoint_control import sun_pointing_control
-from sunpoint_control.sun_pointing_control import ControlParameters, ControlState
 
 
 class Vehicle(NamedTuple):
     """What is common to all cases, from one scripted event to the next."""
 
     period_ns: int
-    cells: SunCells
-    albedo: bool
+    sensors: Sensors
     own_earth: bool  # each case has its own reflectivities
     albedo_model: int  # of `albedo_vector`
-    gyro: Gyro
-    gyro_on: bool
-    magnetometer: Magnetometer
-    magnetometer_on: bool
-    field_divider: int  # steps from one measurement of the field to the next; 0: nobody listens
-    estimator_hears_field: bool
+    heading_hears_field: bool
     control_hears_field: bool
-    estimator: Any
-    control: ControlParameters
+    heading: Any  # parameters of the Sun estimator, or None
+    attitude: Any  # parameters of the attitude filter, or None
+    control: Any  # parameters of the control law, or None
     disturbances: Disturbances
     disturbed: bool
     rod_axes_b: np.ndarray  # (M, 3)
@@ -71,26 +60,34 @@ class Cases(NamedTuple):
     faults: np.ndarray  # (C, F) of cell_faults.FAULT
     reflectivity: np.ndarray  # (C, rows, columns); (0, 0, 0) when the Earth is common
     light: np.ndarray  # (C, 192) room for the light of an own Earth
-    work: np.ndarray  # (C, 224) room for the albedo
+    albedo: np.ndarray  # (C, n) room for the light of the Earth on each cell
+    work: np.ndarray  # (C, 224) room for its sum
 
 
 class CaseState(NamedTuple):
-    """What a flight carries from step to step, beside the wheel momenta."""
+    """What a flight carries from step to step, beside the wheel momenta; None for parts that it does not have."""
 
     rotation: RotationState
-    estimator: Any
-    control: ControlState
+    heading: Any
+    attitude: Any
+    memory: Any  # arrays of the attitude filter, advanced in place
+    control: Any
     field_b: Vec3  # [T] last measurement of the field
     field_step: int  # when it was taken; -1: never
 
 
-TRACE = ("sigma_bn", "omega_bn_b", "sun_b", "omega_estimated_b")
-"""Triples of a trace; wheel torques and speeds follow."""
+class Actuators(NamedTuple):
+    """Arrays of the N wheels and M rods of one case."""
+
+    momentum: np.ndarray  # (N,) [N m s] advanced in place
+    torque: np.ndarray  # (N,) [N m] commanded
+    applied: np.ndarray  # (N,) [N m]
+    speeds: np.ndarray  # (N,) [rad/s]
+    dipole: np.ndarray  # (M,) [A m^2] commanded
 
 
-def trace_columns(wheels: int) -> int:
-    """Columns of a trace for so many wheels."""
-    return 3 * len(TRACE) + 2 * wheels
+TRUTH_COLUMNS = 6
+"""Columns of a trace that hold sigma_bn and omega_bn_b; the measured estimate, wheel torques and speeds follow."""
 
 
 @kernel
@@ -105,27 +102,26 @@ def _case_spacecraft(v: Vehicle, cases: Cases, c: int) -> Spacecraft:
     return Spacecraft(body, v.disturbances, v.rod_axes_b, v.rod_max_dipole, v.disturbed)
 
 
-@kernel
-def _measured_field(
-    v: Vehicle, bias_b: Vec3, key: RandomKey, step: int, dcm_bn: Mat3, environment: EnvironmentState, state: CaseState
-) -> tuple[Vec3, int]:
-    """Last measurement and its step; -1: none yet."""
-    if v.field_divider == 0 or not v.magnetometer_on or step % v.field_divider != 0:
-        return state.field_b, state.field_step
-    return magnetometer.measure(v.magnetometer, bias_b, key, step, multiply(dcm_bn, environment.field_n)), step
+@outer_kernel
+def _case_sensors(v: Vehicle, cases: Cases, c: int) -> SensorsOfCase:
+    key = case_key(cases, c)
+    cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
+    gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
+    return SensorsOfCase(key, cells, gyro_errors, magnetometer.draw_bias(v.sensors.magnetometer, key))
 
 
 @outer_kernel
 def fly_block(
-    v: Vehicle, cases: Cases, states, around: Surroundings, marks, first_step: int, tallies: Tallies, trace
+    v: Vehicle, cases: Cases, states, around: Surroundings, marks, first_step: int, tallies: Any, trace
 ) -> None:
     """Flies all cases through one block of steps.
 
     Args:
         states: list of the `CaseState` of each case, advanced.
-        marks: (K,) of `case_figures.step_marks` for the steps of the block.
+        marks: (K,) of `case_tallies.step_marks` for the steps of the block.
         first_step: number of the first step of the block.
-        trace: (C, K, `trace_columns`) or (0, 0, 0): every step's values for comparisons.
+        tallies: of `case_tallies` or of `attitude_tallies`: which estimate is measured.
+        trace: (C, K, columns) or (0, 0, 0): every step's values for comparisons.
     """
     for c in range(cases.numbers.shape[0]):
         states[c] = _fly_case(v, cases, c, states[c], around, marks, first_step, tallies, trace)
@@ -133,74 +129,78 @@ def fly_block(
 
 @outer_kernel
 def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
-    key = case_key(cases, c)
-    craft = _case_spacecraft(v, cases, c)
-    gyro_errors = gyro.draw_errors(v.gyro, key)
-    field_bias_b = magnetometer.draw_bias(v.magnetometer, key)
-    cells, faults, momentum, work = cases.cells[c], cases.faults[c], cases.wheel_momentum[c], cases.work[c]
-    n, wheels = cells.shape[0], momentum.shape[0]
-    voltages, albedo = np.zeros(n), np.zeros(n)
-    torque, applied, speeds = np.zeros(wheels), np.zeros(wheels), np.zeros(wheels)
-    dipole = np.zeros(v.rod_axes_b.shape[0])
-    since_s = v.period_ns / 1e9
-    cycle_s = v.period_ns * 1e-9
-    for k in range(marks.shape[0]):
-        step = first_step + k
-        environment = state_at(around.states, k)
-        rotation = state.rotation
-        dcm_bn = mrp_to_dcm(rotation.sigma_bn)
-        sun_b = multiply(dcm_bn, environment.sun_n)
-        if v.albedo:
-            if v.own_earth:
-                light = cases.light[c]
-                if v.albedo_model == PATCHES:
-                    gather_light(view_at(around.views, k), cases.reflectivity[c], light)
-                else:
-                    e = environment
-                    point_source(v.albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, cases.reflectivity[c], light)
-            else:
-                light = around.light[k]
-            albedo_output(light, cells, v.cells.screen, v.cells.cos_half_view, dcm_bn, work, albedo)
-        flux = environment.solar_flux * environment.illumination
-        sun_cells.sample(v.cells, cells, faults, key, step, sun_b, flux, albedo, voltages)
-        gyro_b = (0.0, 0.0, 0.0)
-        if v.gyro_on:
-            gyro_b = gyro.measure(v.gyro, gyro_errors, key, step, rotation.omega_bn_b)
-        field_b, field_step = _measured_field(v, field_bias_b, key, step, dcm_bn, environment, state)
-        aiding = Aiding(gyro_b, v.gyro_on, field_b, v.estimator_hears_field and field_step == step)
-        estimator, heading = estimate(v.estimator, state.estimator, since_s, voltages, aiding, around.predicted[k])
-        wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
-        # as the control node has it: the last measurement, for as long as the next may be on its way
-        field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.field_divider
-        control, _ = sun_pointing_control.step(
-            v.control,
-            state.control,
-            since_s,
-            heading.sun_b,
-            heading.validity,
-            heading.eclipse,
-            heading.omega_bn_b,
-            heading.rate_source,
-            speeds,
-            field_b,
-            field_valid,
-            torque,
-            dipole,
-        )
-        momentum_b = sum_along_axes(craft.body.wheels, momentum)
-        tally_step(tallies, c, step, marks[k], sun_b, rotation.omega_bn_b, v.array_normal_b, momentum_b, heading)
-        if trace.shape[0] > 0:
-            _note(trace[c, k], rotation, heading.sun_b, heading.omega_bn_b, torque, speeds)
-        rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, applied)
-        state = CaseState(rotation, estimator, control, field_b, field_step)
-    return state
+    wheels = cases.wheel_momentum.shape[1]
+    actuators = Actuators(
+        cases.wheel_momentum[c], np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.zeros(v.rod_axes_b.shape[0])
+    )
+    craft, sensors, voltages = _case_spacecraft(v, cases, c), _case_sensors(v, cases, c), np.zeros(cases.cells.shape[1])
+    rotation, heading, attitude, control, field_b, field_step = _fly_steps(
+        v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace
+    )
+    return CaseState(rotation, heading, attitude, state.memory, control, field_b, field_step)
 
 
 @kernel
-def _note(out, rotation, sun_b, omega_estimated_b, torque, speeds) -> None:
+def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace):
+    """The steps of a block: a kernel, so that no array is counted as a reference; returns the state but the memory."""
+    torque, dipole, speeds, momentum = actuators.torque, actuators.dipole, actuators.speeds, actuators.momentum
+    # nodes divide the time between stamps, the plant multiplies its period: the last bit may differ
+    since_s = v.period_ns / 1e9
+    cycle_s = v.period_ns * 1e-9
+    rotation, field_b, field_step = state.rotation, state.field_b, state.field_step
+    heading_state, attitude_state, control_state = state.heading, state.attitude, state.control
+    for k in range(marks.shape[0]):
+        step = first_step + k
+        environment = state_at(around.states, k)
+        dcm_bn = mrp_to_dcm(rotation.sigma_bn)
+        sun_b = multiply(dcm_bn, environment.sun_n)
+        light = around.light[min(k, around.light.shape[0] - 1)]
+        if v.own_earth:
+            light = cases.light[c]
+            _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
+        read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
+        if read.field_valid:
+            field_b, field_step = read.field_b, step
+        aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, v.heading_hears_field and read.field_valid)
+        heading_state, heading = estimate_heading(
+            v.heading, heading_state, since_s, voltages, aiding, around.predicted[k]
+        )
+        # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
+        filtered_s = since_s if step > 0 else 0.0
+        aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid)
+        attitude_state, attitude = estimate_attitude(
+            v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
+        )
+        wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
+        # as the control node has it: the last measurement, for as long as the next may be on its way
+        field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
+        control_state = command(
+            v.control, control_state, since_s, heading, speeds, field_b, field_valid, torque, dipole
+        )
+        momentum_b = sum_along_axes(craft.body.wheels, momentum)
+        truth = Truth(rotation.sigma_bn, rotation.omega_bn_b, sun_b, v.array_normal_b, momentum_b, read.gyro_bias_b)
+        tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
+        if trace.shape[0] > 0:
+            _note(trace[c, k], rotation, torque, speeds)
+            note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
+        rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, actuators.applied)
+    return rotation, heading_state, attitude_state, control_state, field_b, field_step
+
+
+@kernel
+def _own_light(albedo_model, around, k, e, reflectivity, light_out) -> None:
+    """Light of an Earth of its own (192,), written."""
+    if albedo_model == PATCHES:
+        gather_light_at(around.views, k, reflectivity, light_out)
+    else:
+        point_source(albedo_model, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, reflectivity, light_out)
+
+
+@kernel
+def _note(out, rotation, torque, speeds) -> None:
     for i in range(3):
         out[i], out[3 + i] = rotation.sigma_bn[i], rotation.omega_bn_b[i]
-        out[6 + i], out[9 + i] = sun_b[i], omega_estimated_b[i]
     wheels = torque.shape[0]
+    end = out.shape[0]
     for i in range(wheels):
-        out[12 + i], out[12 + wheels + i] = torque[i], speeds[i]
+        out[end - 2 * wheels + i], out[end - wheels + i] = torque[i], speeds[i]

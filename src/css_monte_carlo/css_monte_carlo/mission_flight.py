@@ -1,25 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """A mission as the compiled loop flies it: which node plays which part, its parameters, the events that change them."""
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Literal, NamedTuple, overload
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from css_analysis.flight_metrics import windows_of
-from css_common.component import Component
-from css_common.mission import Event, Mission, MissionError, Node
-from css_common.random_streams import RandomKey, random_key
+from css_common.attitude import mrp_add, rotation_vector_to_mrp
+from css_common.mission import Event, Mission, Node
+from css_common.random_streams import RandomKey, Stream, normal4, random_key
 from css_common.schema import Values, default_values, shaped_values
+from css_common.sections import wheel_axes
 from css_common.stepping import first_step
+from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
-from css_estimation.sun.sun_algorithm import SunAlgorithm
+from css_estimation.attitude.attitude_options import GivenStart
+from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.case_tallies import step_marks
-from css_monte_carlo.loop import Cases, CaseState, Vehicle
+from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
+from css_monte_carlo.measures import ATTITUDE, HEADING
+from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables, aligned_table
 from css_sim import (
     cell_errors,
@@ -31,15 +37,13 @@ from css_sim import (
     magnetometer,
     sun_cells,
 )
-from css_sim.nodes.css_array import CssArray
-from css_sim.nodes.dynamics import Dynamics
-from css_sim.nodes.gyro import Gyro
 from css_sim.nodes.magnetometer import Magnetometer
+from css_sim.sensing import Sensors
 from css_sim.spacecraft import spacecraft
 from sunpoint_control import sun_pointing_control
-from sunpoint_control.nodes.mrp_control import MrpControl
 
 _NOWHERE = (0.0, 0.0, 0.0)
+_NO_GYRO = gyro.Gyro(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Stretch(NamedTuple):
@@ -51,59 +55,33 @@ class Stretch(NamedTuple):
     cases: Cases
 
 
-_FLOWN = {
-    Dynamics: "css_sim/dynamics",
-    CssArray: "css_sim/css_array",
-    MrpControl: "sunpoint_control/mrp_control",
-}
-
-
-def refuse_uncovered(mission: Mission) -> None:
-    """Looks whether the compiled loop has a place for a mission, before anything of it is changed.
-
-    Raises:
-        MissionError: it has none.
-    """
-    kinds = [node.component for node in mission.nodes]
-    estimators = [node.name for node in mission.nodes if issubclass(node.component, SunEstimator)]
-    missing = [name for kind, name in _FLOWN.items() if kind not in kinds]
-    if missing or not estimators:
-        lacks = ", ".join([*missing, *([] if estimators else ["a Sun estimator"])])
-        raise MissionError(
-            f"{mission.origin}: the Monte Carlo does not cover this mission: graph.nodes has no {lacks}; "
-            "fly it on the graph"
-        )
-
-
 class MissionFlight:
     """The flights of a mission, all cases of one configuration.
 
     Attributes:
         mission: what flies.
         steps: control cycles of a flight.
+        measure: how the estimator of interest is measured.
         surroundings: the environment that all cases share.
-        marks: (steps,) what is special about each step, see `case_figures.step_marks`.
-
-    Raises:
-        MissionError: the graph has a node, or the mission an event, that the compiled loop has no place for.
+        marks: (steps,) what is special about each step, see `case_tallies.step_marks`.
     """
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, estimator: str | None = None) -> None:
+        """Prepares what all cases share.
+
+        Args:
+            estimator: node whose estimates are measured, None: `graph.estimator`.
+
+        Raises:
+            NoPlace: the graph has a node, or the mission an event, that the compiled loop has no place for.
+            MissionError: there is no such estimator.
+        """
         self.mission = mission
         self.steps = mission.steps
-        self._plant = self._part(Dynamics)
-        self._array = self._part(CssArray)
-        self._control = self._part(MrpControl)
-        self._gyro = self._part(Gyro, required=False)
-        self._magnetometer = self._part(Magnetometer, required=False)
-        self._estimator = mission.node(mission.values.graph.estimator)
-        if not issubclass(self._estimator.component, SunEstimator):
-            raise self._error(f"graph.estimator: {self._estimator.name} is no Sun estimator")
-        known = (Dynamics, CssArray, MrpControl, Gyro, Magnetometer, SunEstimator)
-        for node in mission.nodes:
-            if not issubclass(node.component, known):
-                raise self._error(f"the Monte Carlo has no place for the node {node.name}; fly it on the graph")
-        self._check_events()
+        self._plant, self._array, self._control, self._gyro, self._magnetometer, self._heading, self._filter = parts_of(
+            mission, estimator
+        )
+        self.measure = HEADING if self._filter is None else ATTITUDE
         array = self._array.values
         self._own_earth = array.albedo.enabled and array.albedo.draw != "mean"
         self._grid = earth_reflectivity.source(array, mission.epoch_ns) if array.albedo.enabled else None
@@ -112,7 +90,8 @@ class MissionFlight:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
         self.surroundings = SurroundingsTables(
             self._plant.values,
-            self._estimator.values,
+            _values(self._heading),
+            _values(self._filter),
             common,
             self._own_earth,
             self._feels_field(),
@@ -120,6 +99,11 @@ class MissionFlight:
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
         self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
+
+    @property
+    def trace_columns(self) -> int:
+        """Columns of a trace: truth, the measured estimate, torques and speeds of the wheels."""
+        return TRUTH_COLUMNS + self.measure.estimate_columns + 2 * len(wheel_axes(self._plant.values))
 
     def stretches(self, cases: Cases) -> Iterator[Stretch]:
         """The stretches between scripted events, in order."""
@@ -130,8 +114,13 @@ class MissionFlight:
             array = self._values_after(self._array, done)
             yield Stretch(first, end, self._vehicle(done), cases._replace(faults=self._faults(array, cases.numbers)))
 
-    def cases(self, numbers: np.ndarray) -> tuple[Cases, list[CaseState]]:
-        """Tables and initial states of cases (C,)."""
+    def cases(self, numbers: np.ndarray, guess_deg: float = 0.0) -> tuple[Cases, list[CaseState]]:
+        """Tables and initial states of cases (C,).
+
+        Args:
+            guess_deg: if not 0, an attitude filter begins with an attitude that errs by so many degrees about each
+                axis, 1 sigma, the same for every filter of a case; else as its parameters say.
+        """
         array, plant = self._array.values, self._plant.values
         keys = [self._key(int(number)) for number in numbers]
         bodies = [initial_conditions.dispersed_body(plant, key) for key in keys]
@@ -146,8 +135,6 @@ class MissionFlight:
         if self._own_earth:
             assert self._grid is not None
             earths = np.stack([earth_reflectivity.case_reflectivity(array, self._grid, key) for key in keys])
-        estimator = self._algorithm.initial_state(self._algorithm.parameters(self._estimator.values))
-        control = sun_pointing_control.initial_state(sun_pointing_control.parameters(self._control.values))
         tables = Cases(
             seed_low=keys[0].seed_low,
             seed_high=keys[0].seed_high,
@@ -165,47 +152,73 @@ class MissionFlight:
             faults=self._faults(array, numbers),
             reflectivity=earths,
             light=aligned_table(len(keys) if self._own_earth else 0, len(new_light())),
+            albedo=np.zeros((len(keys), len(nominal))),
             work=aligned_table(len(keys), len(new_workspace())),
         )
-        return tables, [CaseState(rotation, estimator, control, _NOWHERE, -1) for rotation in rotations]
+        heading = control = None
+        if self._heading is not None:
+            heading = _algorithm(self._heading).initial_state(_parameters(self._heading, self._heading.values))
+        if self._control is not None:
+            control = sun_pointing_control.initial_state(sun_pointing_control.parameters(self._control.values))
+        states = []
+        for key, rotation in zip(keys, rotations, strict=True):
+            attitude, memory = self._initial_attitude(key, rotation.sigma_bn, guess_deg)
+            states.append(CaseState(rotation, heading, attitude, memory, control, _NOWHERE, -1))
+        return tables, states
 
-    @property
-    def _algorithm(self) -> SunAlgorithm:
-        component = self._estimator.component
-        assert issubclass(component, SunEstimator)
-        return component.algorithm
+    def _initial_attitude(self, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> tuple[Any, Any]:
+        """State and memory of the attitude filter."""
+        if self._filter is None:
+            return None, None
+        p = _parameters(self._filter, self._filter.values)
+        if guess_deg > 0.0:
+            p = p._replace(start=_guessed_start(key, sigma_bn, guess_deg))
+        algorithm = _algorithm(self._filter)
+        return algorithm.initial_state(p), algorithm.initial_memory(p)
 
     def _vehicle(self, done: list[Event]) -> Vehicle:
         values = {node.name: self._values_after(node, done) for node in self.mission.nodes}
         plant, array = values[self._plant.name], values[self._array.name]
         craft = spacecraft(plant, self._key(0), plant.substeps)
-        gyro_values = values[self._gyro.name] if self._gyro else default_values(Gyro.table())
-        field_values = values[self._magnetometer.name] if self._magnetometer else default_values(Magnetometer.table())
+        heading, attitude, control = (
+            None if node is None else values[node.name] for node in (self._heading, self._filter, self._control)
+        )
         has_field = self._magnetometer is not None
-        control_hears = has_field and plant.rods.fitted
-        estimator_hears = has_field and values[self._estimator.name].rate.use_field
+        control_hears = has_field and control is not None and plant.rods.fitted
+        heading_hears = has_field and heading is not None and heading.rate.use_field
+        is_heard = control_hears or heading_hears or (has_field and attitude is not None)
         x, y, z = (float(c) for c in plant.spacecraft.array_normal)
         return Vehicle(
             period_ns=self.mission.period_ns,
-            cells=sun_cells.parameters(array),
-            albedo=array.albedo.enabled,
+            sensors=self._sensors(values, done, is_heard),
             own_earth=self._own_earth,
             albedo_model=MODELS[array.albedo.model],
-            gyro=gyro.parameters(gyro_values),
-            gyro_on=_is_on(self._gyro, done),
-            magnetometer=magnetometer.parameters(field_values),
-            magnetometer_on=_is_on(self._magnetometer, done),
-            field_divider=field_values.magnetometer.divider if control_hears or estimator_hears else 0,
-            estimator_hears_field=estimator_hears,
+            heading_hears_field=heading_hears,
             control_hears_field=control_hears,
-            estimator=self._algorithm.parameters(values[self._estimator.name]),
-            control=sun_pointing_control.parameters(values[self._control.name]),
+            heading=_parameters(self._heading, heading),
+            attitude=_parameters(self._filter, attitude),
+            control=None if control is None else sun_pointing_control.parameters(control),
             disturbances=craft.disturbances,
             disturbed=craft.disturbed,
             rod_axes_b=craft.rod_axes_b,
             rod_max_dipole=craft.rod_max_dipole,
             substeps=plant.substeps,
             array_normal_b=(x, y, z),
+        )
+
+    def _sensors(self, values: dict[str, Values], done: list[Event], field_is_heard: bool) -> Sensors:
+        array = values[self._array.name]
+        # without a gyro there is no bias to estimate
+        rates = gyro.parameters(values[self._gyro.name]) if self._gyro else _NO_GYRO
+        field_values = values[self._magnetometer.name] if self._magnetometer else default_values(Magnetometer.table())
+        return Sensors(
+            cells=sun_cells.parameters(array),
+            earthlit=array.albedo.enabled,
+            gyro=rates,
+            gyro_on=_is_on(self._gyro, done),
+            magnetometer=magnetometer.parameters(field_values),
+            magnetometer_on=_is_on(self._magnetometer, done),
+            field_divider=field_values.magnetometer.divider if field_is_heard else 0,
         )
 
     def _feels_field(self) -> bool:
@@ -218,37 +231,35 @@ class MissionFlight:
     def _key(self, case: int) -> RandomKey:
         return random_key(self.mission.values.mission.seed, case)
 
-    def _error(self, reason: str) -> MissionError:
-        return MissionError(f"{self.mission.origin}: {reason}")
-
-    @overload
-    def _part(self, component: type[Component]) -> Node: ...
-
-    @overload
-    def _part(self, component: type[Component], required: Literal[False]) -> Node | None: ...
-
-    def _part(self, component: type[Component], required: bool = True) -> Node | None:
-        nodes = [node for node in self.mission.nodes if node.component is component]
-        if len(nodes) > 1:
-            raise self._error(f"{nodes[0].name} and {nodes[1].name} are both {component.__name__}; expected one")
-        if required and not nodes:
-            raise self._error(f"no node of graph.nodes is {component.__name__}, which the Monte Carlo needs")
-        return nodes[0] if nodes else None
-
-    def _check_events(self) -> None:
-        switched = [node.name for node in (self._gyro, self._magnetometer) if node is not None]
-        for event in self.mission.events:
-            if event.action != "set" and event.node not in switched:
-                allowed = ", ".join(switched) or "none"
-                raise self._error(
-                    f"events.{event.name}: the Monte Carlo switches sensors alone, here {allowed}; fly it on the graph"
-                )
-
     def _values_after(self, node: Node, done: list[Event]) -> Values:
         """Values of a node once scripted changes have been made."""
         canonical = dict(node.canonical)
         canonical |= {e.parameter: e.value for e in done if e.node == node.name and e.action == "set"}
         return shaped_values(node.component.table(), canonical)
+
+
+def _values(node: Node | None) -> Values | None:
+    return None if node is None else node.values
+
+
+def _algorithm(node: Node) -> Any:
+    """The module of an estimator's node."""
+    component = node.component
+    assert issubclass(component, (SunEstimator, AttitudeFilter))
+    return component.algorithm
+
+
+def _parameters(node: Node | None, values: Values | None) -> Any:
+    """Parameters of the algorithm of an estimator's node, None without the node."""
+    return None if node is None else _algorithm(node).parameters(values)
+
+
+def _guessed_start(key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> GivenStart:
+    """A start beside the true attitude, by a draw of `guess_deg` [deg] about each axis, 1 sigma."""
+    sigma = math.radians(guess_deg)
+    x, y, z, _ = normal4(key, Stream.ATTITUDE_GUESS, 0, 0)
+    guess = mrp_add(sigma_bn, rotation_vector_to_mrp((sigma * x, sigma * y, sigma * z)))
+    return GivenStart(True, guess, sigma**2)
 
 
 def _is_on(sensor: Node | None, done: list[Event]) -> bool:

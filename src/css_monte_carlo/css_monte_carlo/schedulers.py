@@ -7,8 +7,6 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from typing import Any, NamedTuple, Self
 
-from css_analysis.flight_metrics import windows_of
-from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import ChunkTask, flown_task
 from css_monte_carlo.study_folder import StudyError, parquet_bytes
 
@@ -22,9 +20,8 @@ class ChunkResult(NamedTuple):
 
 def run_task(task: ChunkTask) -> ChunkResult:
     """Flies a chunk; the same bytes wherever it runs."""
-    numbers, mission, flown = flown_task(task)
-    table = case_table(numbers, flown.tallies, mission.period_ns * 1e-9, windows_of(mission))
-    return ChunkResult(parquet_bytes(table), flown.cpu_s)
+    table, cpu_s = flown_task(task)
+    return ChunkResult(parquet_bytes(table), cpu_s)
 
 
 class Scheduler(ABC):

@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
-from css_analysis.flight_metrics import windows_of
-from css_analysis.quantities import study_quantities
+from css_analysis.flight_metrics import Windows, windows_of
 from css_common.kernel import study_hash
-from css_common.mission import Mission
+from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
-from css_monte_carlo.case_tallies import SAMPLED
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.direct_flight import configured
+from css_monte_carlo.direct_flight import configured, is_attitude_filter
+from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
+from css_monte_carlo.mission_parts import NoPlace, parts_of
 from css_monte_carlo.percentiles import over_cases
 from css_monte_carlo.schedulers import Scheduler, ThreadScheduler
 from css_monte_carlo.study_folder import StudyFolder
@@ -33,7 +33,7 @@ Progress = Callable[[int, int], None]
 class Configuration(NamedTuple):
     """One way to fly all cases."""
 
-    estimator: str
+    estimator: str  # whose estimates are measured: a Sun estimator, which controls, or an attitude filter
     gyro: bool
     overrides: tuple[str, ...] = ()  # `key=value` on top of the mission, such as a point of a sweep
 
@@ -59,7 +59,8 @@ class Study:
     Attributes:
         folder: where it lies.
         manifest: what was asked for.
-        cases: one row per configuration and case: estimator, gyro, overrides, case and `study_quantities`.
+        cases: one row per configuration and case: estimator, gyro, overrides, case and the quantities of `measures`;
+            null what is not of the kind of the estimator.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
@@ -92,6 +93,7 @@ def run_study(
     *,
     first_case: int = 0,
     sample_s: float = 1.0,
+    guess_deg: float = 0.0,
     threads: int | None = None,
     progress: Progress | None = None,
     scheduler: Scheduler | None = None,
@@ -102,33 +104,44 @@ def run_study(
         mission: what flies; its case is ignored.
         folder: a new or empty folder, or that of the same study begun before.
         sample_s: time between samples of the percentiles [s].
+        guess_deg: attitude filters begin with an attitude that errs by so many degrees about each axis, 1 sigma; 0: as
+            their parameters say.
         threads: flights at a time in this process; None: one per processor.
         progress: told after each chunk.
         scheduler: where chunks run; None: threads of this process.
 
     Raises:
-        MissionError: a configuration does not fit the mission, a check before the flight refuses it, or it has no
-            place in the loop.
+        MissionError: a configuration does not fit the mission, a check before the flight refuses it, or it measures
+            nothing.
         StudyError: the folder cannot be used.
     """
     configurations = tuple(configurations)
     missions = [configuration.applied(mission) for configuration in configurations]
-    warnings = tuple(dict.fromkeys(line for flown in missions for line in preflight(flown)))
+    stepped = [_why_stepped(flown, c.estimator) for flown, c in zip(missions, configurations, strict=True)]
+    if guess_deg > 0.0 and any(stepped):
+        raise MissionError(f"{next(filter(None, stepped))}: attitude filters can be given no guess")
+    doubts = [line for flown in missions for line in preflight(flown)]
+    doubts += [f"{reason}; flown node by node, some hundred times slower" for reason in stepped if reason]
+    warnings = tuple(dict.fromkeys(doubts))
     report(warnings)
     sample_every = max(1, round(sample_s / (mission.period_ns * 1e-9)))
     store = StudyFolder(Path(folder))
+    named = zip(configurations, missions, strict=True)
+    filters = list(dict.fromkeys(c.estimator for c, flown in named if is_attitude_filter(flown, c.estimator)))
     manifest = _manifest(mission, configurations, cases, first_case, sample_every)
+    # only where there is something to say: a study of Sun estimators is the same without
+    manifest |= {"attitude_filters": filters} if filters else {}
+    manifest |= {"guess_deg": guess_deg} if guess_deg > 0.0 else {}
     store.prepare(manifest)
     if store.complete:
         return replace(read_study(folder), warnings=warnings)
-    ranges = [
-        (first, min(CHUNK_CASES, first_case + cases - first))
-        for first in range(first_case, first_case + cases, CHUNK_CASES)
-    ]
+    ranges = [_ranges(first_case, first_case + cases, 1 if reason else CHUNK_CASES) for reason in stepped]
     tasks = {
-        _chunk_name(i, first, count): ChunkTask(flown.text(), flown.origin, first, count, sample_every)
-        for i, flown in enumerate(missions)
-        for first, count in ranges
+        _chunk_name(i, first, count): ChunkTask(
+            flown.text(), flown.origin, first, count, sample_every, configuration.estimator, guess_deg
+        )
+        for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
+        for first, count in ranges[i]
     }
     waiting = {name: task for name, task in tasks.items() if not store.has_chunk(name)}
     total = cases * len(configurations)
@@ -144,12 +157,34 @@ def run_study(
             done += waiting[name].cases
             if progress is not None:
                 progress(done, total)
-    names = [[_chunk_name(i, first, count) for first, count in ranges] for i in range(len(configurations))]
+    parts = [
+        _Part(
+            configuration,
+            ATTITUDE if configuration.estimator in filters else HEADING,
+            windows_of(flown),
+            [_chunk_name(i, *chunk) for chunk in ranges[i]],
+        )
+        for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
+    ]
     store.finish(
-        _merged_cases(store, configurations, missions, names),
-        _merged_percentiles(store, configurations, names, sample_every * mission.period_ns * 1e-9),
+        _merged_cases(store, parts),
+        _merged_percentiles(store, parts, sample_every * mission.period_ns * 1e-9),
     )
     return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
+
+
+def _why_stepped(mission: Mission, estimator: str) -> str | None:
+    """Why the compiled loop has no place for a mission; None if it has."""
+    try:
+        parts_of(mission, estimator)
+    except NoPlace as reason:
+        return str(reason)
+    return None
+
+
+def _ranges(first_case: int, end: int, size: int) -> list[tuple[int, int]]:
+    """First case and number of cases of each chunk."""
+    return [(first, min(size, end - first)) for first in range(first_case, end, size)]
 
 
 def _chunk_name(configuration: int, first: int, count: int) -> str:
@@ -174,26 +209,31 @@ def _manifest(
     }
 
 
-def _merged_cases(
-    store: StudyFolder, configurations: Sequence[Configuration], missions: Sequence[Mission], names: list[list[str]]
-) -> pa.Table:
+class _Part(NamedTuple):
+    """A configuration with its chunks."""
+
+    configuration: Configuration
+    measure: Measure
+    windows: Windows
+    chunks: list[str]
+
+
+def _merged_cases(store: StudyFolder, parts: Sequence[_Part]) -> pa.Table:
     tables = []
-    for configuration, mission, chunks in zip(configurations, missions, names, strict=True):
-        columns = ["case", *(quantity.study_column for quantity in study_quantities(windows_of(mission)))]
-        table = pa.concat_tables([store.read_chunk(name, columns) for name in chunks]).combine_chunks()
-        tables.append(_labelled(configuration, table))
-    # a sweep may change what is measured
+    for part in parts:
+        columns = ["case", *(quantity.study_column for quantity in part.measure.quantities(part.windows))]
+        table = pa.concat_tables([store.read_chunk(name, columns) for name in part.chunks]).combine_chunks()
+        tables.append(_labelled(part.configuration, table))
+    # a sweep may change what is measured, and estimators of each kind have columns of their own
     return pa.concat_tables(tables, promote_options="default").combine_chunks()
 
 
-def _merged_percentiles(
-    store: StudyFolder, configurations: Sequence[Configuration], names: list[list[str]], sample_s: float
-) -> pa.Table:
+def _merged_percentiles(store: StudyFolder, parts: Sequence[_Part], sample_s: float) -> pa.Table:
     tables = []
-    for configuration, chunks in zip(configurations, names, strict=True):
-        for quantity in SAMPLED:
+    for part in parts:
+        for quantity in part.measure.sampled:
             # one quantity of one configuration at a time: a study may be far larger than memory
-            rows = [store.read_chunk(name, [quantity]).column(0).combine_chunks() for name in chunks]
+            rows = [store.read_chunk(name, [quantity]).column(0).combine_chunks() for name in part.chunks]
             samples = np.concatenate([r.flatten().to_numpy().reshape(len(r), -1) for r in rows])
             over = over_cases(samples)
             length = samples.shape[1]
@@ -205,7 +245,7 @@ def _merged_percentiles(
                     **{name: pa.array(values, pa.float64(), from_pandas=True) for name, values in over.items()},
                 }
             )
-            tables.append(_labelled(configuration, table))
+            tables.append(_labelled(part.configuration, table))
     return pa.concat_tables(tables).combine_chunks()
 
 

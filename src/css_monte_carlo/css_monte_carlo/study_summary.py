@@ -8,20 +8,23 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from css_analysis.flight_metrics import windows_of
-from css_analysis.quantities import Summary, summaries
+from css_analysis.quantities import Summary
 from css_common.mission import mission_from_text
+from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.study import Study
 
 
 def configuration_objects(study: Study) -> list[dict[str, Any]]:
     """One dictionary per configuration: means over the cases; None for what no case reached."""
-    told = summaries_of(study)
     return [
         {
             "estimator": labels["estimator"],
             "gyro": "on" if labels["gyro"] else "off",
             "overrides": labels["overrides"].split(),
-            **{summary.name: _over(rows_of(study.cases, **labels), summary) for summary in told},
+            **{
+                summary.name: _over(rows_of(study.cases, **labels), summary)
+                for summary in summaries_of(study, labels["estimator"])
+            },
         }
         for labels in study.manifest["configurations"]
     ]
@@ -49,10 +52,11 @@ def rows_of(table: pa.Table, **labels: Any) -> pa.Table:
     return table
 
 
-def summaries_of(study: Study) -> tuple[Summary, ...]:
-    """What is told of the cases of a study's mission."""
+def summaries_of(study: Study, estimator: str) -> tuple[Summary, ...]:
+    """What is told of the cases of a study's mission with one of its estimators."""
     mission = mission_from_text(study.manifest["mission_text"], str(study.folder))
-    return summaries(windows_of(mission))
+    measure = ATTITUDE if estimator in study.manifest.get("attitude_filters", ()) else HEADING
+    return measure.summaries(windows_of(mission))
 
 
 def _over(cases: pa.Table, summary: Summary) -> float | None:

@@ -15,9 +15,10 @@ from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
 from css_environment import ephemeris
 from css_environment.albedo_vector import PATCHES, earth_light_sources
-from css_environment.earth_light import EarthView, look_at_earth, new_earth_view, new_light
+from css_environment.earth_light import EarthView, gather_light, look_at_earth, new_earth_view, new_light
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.mission_environment import MissionEnvironment
+from css_estimation.attitude.flight_references import FlightReferences, References
 from css_estimation.sun.eclipse_prediction import EclipsePrediction
 from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN
 from css_sim.flight_environment import flight_environment
@@ -41,13 +42,20 @@ STATE = np.dtype(
 )
 """`EnvironmentState` of one step."""
 
+REFERENCE = np.dtype(
+    [("sun_n", np.float64, 3), ("field_n", np.float64, 3), ("intensity", np.float64), ("sunlit", np.bool_)], align=True
+)
+"""`References` of one step."""
+
 
 class Surroundings(NamedTuple):
     """Tables of one block of K steps."""
 
     states: np.ndarray  # (K,) of STATE
-    predicted: np.ndarray  # (K,) what the estimator's orbit model says about the shadow
-    light: np.ndarray  # (K, 192) patches of light of the Earth; (0, 192) when each case has its own Earth, or none
+    predicted: np.ndarray  # (K,) what the Sun estimator's orbit model says about the shadow
+    references: np.ndarray  # (K,) of REFERENCE, what the attitude filter's models say; (0,) without one
+    predicted_light: np.ndarray  # (K, 192) patches of light by them; (1, 192) when no filter takes albedo off
+    light: np.ndarray  # (K, 192) patches of light of the Earth; (1, 192) when each case has its own Earth, or none
     views: EarthView  # (K, ...) the Earth seen from the orbit, for cases that sum patches of their own; else (0, ...)
 
 
@@ -67,10 +75,29 @@ def state_at(states, k: int) -> EnvironmentState:
     )
 
 
+@kernel
+def references_at(table, k: int) -> References:
+    """What the attitude filter's models say at a step."""
+    r = table[k]
+    return References(
+        (r.sun_n[0], r.sun_n[1], r.sun_n[2]),
+        r.intensity,
+        r.sunlit,
+        (r.field_n[0], r.field_n[1], r.field_n[2]),
+    )
+
+
 @outer_kernel
 def view_at(views: EarthView, k: int) -> EarthView:
     """The Earth as seen at a step."""
     return EarthView(views.frame[k], views.circles[k], views.light[k], views.cell[k], views.disc[k])
+
+
+@kernel
+def gather_light_at(views: EarthView, k: int, reflectivity, light_out) -> None:
+    """Light of an Earth of its own (rows, columns), as seen at a step: (192,), written."""
+    view = EarthView(views.frame[k], views.circles[k], views.light[k], views.cell[k], views.disc[k])
+    gather_light(view, reflectivity, light_out)
 
 
 @outer_kernel
@@ -104,7 +131,8 @@ class SurroundingsTables:
 
     Args:
         plant: values of the node that owns the truth (its orbit, shadow and field).
-        estimator: values of the estimator that flies (its eclipse prediction); None: none asks for one.
+        heading: values of the Sun estimator that flies (its eclipse prediction); None: none flies.
+        attitude: values of the attitude filter that flies (its own models); None: none flies.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
@@ -114,7 +142,8 @@ class SurroundingsTables:
     def __init__(
         self,
         plant: Values,
-        estimator: Values | None,
+        heading: Values | None,
+        attitude: Values | None,
         reflectivity: np.ndarray | None,
         own_earth: bool = False,
         field: bool = True,
@@ -122,8 +151,10 @@ class SurroundingsTables:
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field)
         self._prediction: EclipsePrediction | None = None
-        if estimator is not None and estimator.eclipse.source != "sensors":
-            self._prediction = EclipsePrediction(estimator)
+        if heading is not None and heading.eclipse.source != "sensors":
+            self._prediction = EclipsePrediction(heading)
+        self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
+        self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
         self._epoch_ns = parse_utc(plant.mission.epoch)
         self._reflectivity = reflectivity
@@ -166,14 +197,27 @@ class SurroundingsTables:
                 predicted[k] = self._prediction.at(self._epoch_ns + (first + k) * self._period_ns)
         grid = self._reflectivity
         has_light = grid is not None and not self._own_earth
-        light = aligned_table(count if has_light else 0, len(new_light()))
+        light = aligned_table(count if has_light else 1, len(new_light()))
         has_views = grid is not None and self._own_earth and self._albedo_model == PATCHES
         views = _views(count if has_views else 0)
         if grid is not None and has_views:
             _tabulate_views(states, views, *grid.shape)
         elif grid is not None and has_light:
             _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
-        return Surroundings(states, predicted, light, views)
+        return Surroundings(states, predicted, *self._modelled(first, count), light, views)
+
+    def _modelled(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """What the attitude filter's models say, and the light that they predict."""
+        references = np.zeros(count if self._models is not None else 0, REFERENCE)
+        light = aligned_table(count if self._predicts_light else 1, len(new_light()))
+        for k in range(len(references)):
+            assert self._models is not None
+            r = self._models.at((first + k) * self._period_ns * 1e-9)
+            references[k] = r.sun_n, r.field_n, r.intensity, r.sunlit
+            # in the shadow the light stays as it was; nobody reads it there
+            if self._predicts_light and r.sunlit:
+                light[k] = self._models.light
+        return references, light
 
 
 def aligned_table(rows: int, columns: int) -> np.ndarray:
@@ -188,4 +232,5 @@ def _views(count: int) -> EarthView:
 
 
 def _size(block: Surroundings) -> int:
-    return sum(a.nbytes for a in (block.states, block.predicted, block.light, *block.views))
+    *tables, views = block
+    return sum(a.nbytes for a in (*tables, *views))

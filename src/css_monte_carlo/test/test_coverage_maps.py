@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 from matplotlib import image
+from okeefe_spacecraft import okeefe_values
 from scipy.spatial.transform import Rotation
 
-from css_common.schema import default_values
 from css_estimation.nodes.wavg import Wavg
 from css_monte_carlo.commands.coverage import main
 from css_monte_carlo.coverage import CellMap, Grid, grid_about, layout_of, map_cells
@@ -19,14 +19,14 @@ from css_sim.nodes.css_array import CssArray
 
 Z = (0.0, 0.0, 1.0)
 COARSE = grid_about(Z, 90, 180)
-NORMALS = default_values(CssArray.table()).cells.normals
+NORMALS = okeefe_values(CssArray.table()).cells.normals
 NO_CLIP = (0.0, 0.0, 0.0)
 
 
 def layout(**changes):
     """The default layout with changes to its cells, or to the gate of the average."""
     gate = {name: changes.pop(name) for name in ("gate", "gate_kind") if name in changes}
-    return layout_of(default_values(CssArray.table(), **changes), default_values(Wavg.table(), **changes, **gate))
+    return layout_of(okeefe_values(CssArray.table(), **changes), okeefe_values(Wavg.table(), **changes, **gate))
 
 
 def directions(grid: Grid) -> np.ndarray:

@@ -7,8 +7,8 @@ within 19 deg of the array normal.
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 
-from css_common.schema import default_values
 from css_estimation.nodes.wavg import Wavg
 from css_monte_carlo.coverage import grid_about, layout_of, map_cells
 from css_monte_carlo.coverage_statistics import holes, seen_fractions, wavg_errors
@@ -20,7 +20,7 @@ Z = (0.0, 0.0, 1.0)
 def layout(**changes):
     """The default layout with changes to its cells, or to the gate of the average."""
     gate = {name: changes.pop(name) for name in ("gate", "gate_kind") if name in changes}
-    return layout_of(default_values(CssArray.table(), **changes), default_values(Wavg.table(), **changes, **gate))
+    return layout_of(okeefe_values(CssArray.table(), **changes), okeefe_values(Wavg.table(), **changes, **gate))
 
 
 @pytest.fixture(scope="module")

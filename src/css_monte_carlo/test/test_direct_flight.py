@@ -12,7 +12,7 @@ from synthetic_flight import record
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import read_flight
 from css_analysis.flight_metrics import sunlit_passes
-from css_common.mission import default_mission, mission_from_text
+from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_monte_carlo.direct_flight import configured, fly_directly
 from css_msgs.msg import SunEstimate
@@ -22,13 +22,13 @@ CASES = range(3)
 
 
 def short(*overrides: str, duration: float = 20.0):
-    return default_mission().with_overrides([f"mission.duration={duration}", *overrides])
+    return load_mission("okeefe_2013").with_overrides([f"mission.duration={duration}", *overrides])
 
 
 @pytest.fixture(scope="module")
 def cases():
     """Runs of a few cases, by estimator, with gyro."""
-    mission = default_mission().with_overrides([TEN_MINUTES])
+    mission = load_mission("okeefe_2013").with_overrides([TEN_MINUTES])
     return {
         estimator: [
             estimator_runs(fly_directly(configured(mission, case=case, estimator=estimator)))[0] for case in CASES
@@ -84,7 +84,7 @@ def test_a_flight_is_repeatable_and_a_case_is_not_another():
 
 
 def test_estimators_beside_the_flown_one_do_not_change_the_flight():
-    nodes = [*default_mission().values.graph.nodes, "css_estimation/wavg"]
+    nodes = [*load_mission("okeefe_2013").values.graph.nodes, "css_estimation/wavg"]
     both = fly_directly(short(f"graph.nodes={','.join(nodes)}"))
     alone = fly_directly(short())
     assert set(both.estimates) == {"ekf", "wavg"} and both.flown == "ekf"
@@ -105,7 +105,7 @@ def test_a_mission_without_control_tumbles_on():
     nodes = ["css_sim/dynamics", "css_sim/css_array", "css_sim/gyro", "css_estimation/ekf"]
     log = fly_directly(short(f"graph.nodes={','.join(nodes)}"))
     assert log.control is None and log.flown is None
-    body = default_mission().values.spacecraft.inertia
+    body = load_mission("okeefe_2013").values.spacecraft.inertia
     momentum = np.linalg.norm(log.truth.omega_bn_b @ body, axis=1)
     assert np.ptp(momentum) < 0.01 * momentum[0]
 
@@ -114,6 +114,7 @@ def test_scripted_changes_come_when_they_are_due():
     text = """
 /**:
   ros__parameters:
+    extends: okeefe_2013
     mission: {duration: 20.0}
     events:
       off: {time: 5.0, node: gyro, action: deactivate}

@@ -40,6 +40,23 @@ def test_json_on_the_last_line(tmp_path, capsys):
     assert rows == [[name, gyro, noise] for name in ("ekf", "wavg") for gyro in ("on", "off") for noise in ("0", "0.1")]
 
 
+def test_a_mission_of_attitude_filters_is_a_study_like_every_other(tmp_path, capsys):
+    arguments = ["cubesat_vmm", "--duration", "330", "--cases", "3", "--guess", "20", "--json"]
+    assert main([*arguments, "--sweep", "gyro.noise_deg_s=0.03,0.3", "--out", str(tmp_path / "s")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    rows = json.loads(lines[-1])["configurations"]
+    flown = [(row["estimator"], row["gyro"], *row["overrides"]) for row in rows]
+    filters = ("attitude_vector", "attitude_voltage")
+    assert flown == [(name, "on", f"gyro.noise_deg_s={noise}") for noise in ("0.03", "0.3") for name in filters]
+    assert all(row["first_attitude_s"] == 0.0 and row["steps_without_estimate"] == 0.0 for row in rows)
+    quiet, noisy = rows[1]["attitude_error_mean_deg"], rows[3]["attitude_error_mean_deg"]
+    assert 0.1 < quiet < noisy
+    assert "heading_error_mean_deg" not in rows[0]
+    assert any("attitude_voltage" in line for line in lines[:-1])
+    assert main([*arguments, "--estimators", "attitude_vectr", "--out", str(tmp_path / "t")]) == 2
+    assert "did you mean attitude_vector?" in capsys.readouterr().err
+
+
 def test_the_seed_changes_the_cases(tmp_path, capsys):
     means = []
     for seed in ("1", "2"):
@@ -60,6 +77,7 @@ WRONG = {
     "first case": (["--first-case", "-1"], "--first-case: -1 given, expected at least 0"),
     "too many cases": (["--first-case", "4294967295"], "expected cases below 2**32"),
     "threads": (["--threads", "0"], "--threads: 0 given, expected at least 1"),
+    "guess": (["--guess", "200"], "--guess: 200 given, expected 0 to 180 [deg]"),
     "sample": (["--sample", "0"], "--sample: 0 given, expected seconds above 0"),
     "duration": (["--duration", "-5"], "mission.duration: -5.0 given, expected above 0 and at most 3.2e+07 [s]"),
     "seed": (["--seed", "-1"], "mission.seed: -1 given, expected at least 0"),
@@ -69,19 +87,20 @@ WRONG = {
 }
 
 
-UNCOVERED = {
-    "cubesat_vmm": "graph.nodes has no sunpoint_control/mrp_control, a Sun estimator; fly it on the graph",
-    "esprit_2006": "graph.nodes has no css_sim/dynamics, css_sim/css_array, sunpoint_control/mrp_control, a Sun",
+NOTHING_TO_FLY = {
+    "no node of graph.nodes owns simulated time, nothing can fly": "css_sim/css_array, css_estimation/ekf",
+    "no node of graph.nodes estimates Sun or attitude, nothing to measure": "css_sim/dynamics, css_sim/css_array",
 }
 
 
-@pytest.mark.parametrize("mission", UNCOVERED)
-def test_mission_that_is_not_covered_is_said_before_anything_starts(mission, tmp_path, capsys):
+@pytest.mark.parametrize("reason", NOTHING_TO_FLY)
+def test_mission_without_a_plant_or_an_estimator_is_said_before_anything_starts(reason, tmp_path, capsys):
+    file = tmp_path / "lacking.yaml"
+    file.write_text(f"/**: {{ros__parameters: {{graph: {{nodes: [{NOTHING_TO_FLY[reason]}]}}}}}}")
     for arguments in ([], ["--estimators", "ekf"], ["--gyro", "off"]):
-        assert main([mission, "--out", str(tmp_path / "s"), *arguments]) == 2
+        assert main([str(file), "--out", str(tmp_path / "s"), *arguments]) == 2
         err = capsys.readouterr().err
-        assert f"{mission}.yaml: the Monte Carlo does not cover this mission: {UNCOVERED[mission]}" in err
-        assert err.startswith("monte_carlo: error: ") and err.count("\n") == 1
+        assert err == f"monte_carlo: error: {file}: {reason}\n"
         assert not (tmp_path / "s").exists()
 
 

@@ -5,13 +5,14 @@ import numpy as np
 import pytest
 from listing import estimators_by_mission
 
-from css_common.mission import default_mission, load_mission, mission_from_text
+from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import configured, fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
+from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_msgs.msg import SunEstimate
 
@@ -51,6 +52,7 @@ VARIANTS = {
         "mrp_control.dumping.enabled=true",
         "dynamics.initial.wheel_speed_rpm=2000",
     ),
+    "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }
 
@@ -61,7 +63,8 @@ def same_steps(mission):
     for case, flown in zip(CASES, trace, strict=True):
         log = fly_directly(mission.with_overrides([f"mission.case={case}"]))
         truth, estimate = log.having("truth"), log.estimates[mission.values.graph.estimator]
-        torque, speed = log.having("torque_command").torque, log.having("wheels").speed
+        speed = log.having("wheels").speed
+        torque = np.zeros_like(speed) if log.torque_command is None else log.torque_command.torque
         expected = (truth.sigma_bn, truth.omega_bn_b, estimate.sun_b, estimate.omega_bn_b, torque, speed)
         np.testing.assert_array_equal(flown, np.hstack(expected))
     return trace.shape[1]
@@ -69,14 +72,14 @@ def same_steps(mission):
 
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_every_step_is_the_same(variant):
-    mission = default_mission().with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
+    mission = load_mission("okeefe_2013").with_overrides(["mission.duration=20.0", *VARIANTS[variant]])
     assert same_steps(mission) == 200
 
 
 @pytest.mark.parametrize("estimator", estimators_by_mission(SunEstimator)["okeefe_2013"])
 @pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
 def test_every_estimator_is_the_same(estimator, gyro):
-    mission = configured(default_mission(), estimator=estimator, gyro=gyro)
+    mission = configured(load_mission("okeefe_2013"), estimator=estimator, gyro=gyro)
     assert same_steps(mission.with_overrides(["mission.duration=20.0"])) == 200
 
 
@@ -129,21 +132,20 @@ def test_the_same_over_several_blocks_and_scripted_changes():
       failed: {time: 135.0, node: css_array, action: set, parameter: faults, value: ['2 dead']}
       on: {time: 140.0, node: gyro, action: activate}
     """
-    mission = mission_from_text(f"/**:\n  ros__parameters:\n    mission: {{duration: 150.0}}{events}", "scripted")
+    mission = mission_from_text(
+        f"/**:\n  ros__parameters:\n    extends: okeefe_2013\n    mission: {{duration: 150.0}}{events}", "scripted"
+    )
     assert same_steps(mission) == 1500 > BLOCK_STEPS
 
 
 REFUSED = {
     "another event": (
         "/**: {ros__parameters: {events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
-        "scripted: events.a: the Monte Carlo switches sensors alone, here gyro; fly it on the graph",
-    ),
-    "no control": (
-        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_estimation/ekf]}}}",
-        "scripted: no node of graph.nodes is MrpControl, which the Monte Carlo needs",
+        "scripted: events.a: the compiled loop switches sensors alone, here gyro",
     ),
     "two gyros": (
-        "/**: {ros__parameters: {graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
+        "/**: {ros__parameters: {extends: okeefe_2013, "
+        "graph: {nodes: [css_sim/dynamics, css_sim/css_array, css_sim/css_array:two, "
         "css_sim/gyro, css_estimation/ekf, sunpoint_control/mrp_control]}}}",
         "two",
     ),
@@ -157,3 +159,10 @@ def test_what_the_loop_has_no_place_for_is_named(case):
         MissionFlight(mission_from_text(text, "scripted"))
     assert reason in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_sun_estimator_beside_the_one_that_controls_has_no_place():
+    nodes = "css_sim/dynamics,css_sim/css_array,css_estimation/ekf,css_estimation/wavg,sunpoint_control/mrp_control"
+    mission = load_mission("okeefe_2013").with_overrides([f"graph.nodes={nodes}"])
+    with pytest.raises(NoPlace, match="wavg does not control"):
+        MissionFlight(mission, "wavg")

@@ -18,6 +18,7 @@ from css_common.kernel import typed_call
 from css_estimation.sun.sun_heading import NO_COVARIANCE, VALIDITY_VALID, SunHeading
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import FINAL, LATE, REPORTED, SUNLIT, new_tallies, step_marks, tally_step
+from css_monte_carlo.step_truth import Truth
 
 _tally_step = typed_call(tally_step)
 UP = (0.0, 0.0, 1.0)
@@ -37,7 +38,8 @@ def tallied(pointing_deg, illumination, rates, period_s):
     true, estimated = tilted(pointing_deg), tilted(pointing_deg + OFF_DEG)
     for step, rate in enumerate(rates.tolist()):
         sun_b, said = tuple(true[step].tolist()), heading(estimated[step].tolist())
-        _tally_step(tallies, 0, step, int(marks[step]), sun_b, (0.0, 0.0, rate), UP, STILL, said)
+        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL)
+        _tally_step(tallies, 0, step, int(marks[step]), truth, said, None, None)
     (row,) = case_table(np.arange(1), tallies, period_s, WINDOWS).to_pylist()
     return row
 

@@ -66,9 +66,9 @@ def test_what_was_published_before_the_recorder_came_is_still_had_from_the_loop(
 
 
 def test_the_plant_is_heard_last_so_that_it_waits_for_the_recorder(tmp_path, graph):
-    from css_common.mission import default_mission
+    from css_common.mission import load_mission
 
-    mission = default_mission()
+    mission = load_mission("okeefe_2013")
     plant = graph.node("plant")
     plant_topics = {output.topic for output in mission.plant.outputs}
     of_the_plant = [
@@ -220,9 +220,9 @@ def test_what_is_excluded_is_left_out(flight, tmp_path, graph):
 
 
 def test_a_mission_is_recorded_without_what_is_excluded(tmp_path, graph):
-    from css_common.mission import default_mission
+    from css_common.mission import load_mission
 
-    mission = default_mission()
+    mission = load_mission("okeefe_2013")
     recorder = graph.add(
         RecorderNode(mission, tmp_path / "bag", choice=RecordingChoice(Excluded(["truth"])), **graph.options)
     )

@@ -11,19 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from css_common.attitude import rotation_vector_to_dcm
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, normal_quantile, uniform4
-from css_common.schema import Table, Values, real
+from css_common.schema import real
 from css_common.vectors import Vec3, add, axes_across, multiply_transposed, scale
-
-PARAMETERS: Table = (
-    real("fixed_degradation", 0.0, "-", "largest lasting loss of a cell, uniform", low=0.0, high=1.0),
-    real("scale_common_error", 0.0, "-", "1 sigma of the scale error of all cells", low=0.0, high=1.0),
-    real("scale_cell_error", 0.0, "-", "1 sigma of the scale error of each cell", low=0.0, high=1.0),
-    real("scale", 1.0, "-", "output of all cells, relative to what they are calibrated to", low=0.0, high=10.0),
-    real("misalignment_deg", 0.0, "deg", "1 sigma of the tilt of each normal, per axis", low=0.0, high=45.0),
-    real("bias", 0.0, "-", "1 sigma of the constant offset of each cell", low=0.0, high=1.0),
-)
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "bias")], align=True)
 """One cell: true outward unit normal in b; side of the screen that hides part of its sky, by the nominal normal, 0
@@ -33,24 +25,27 @@ for none; gain [-] and offset [-] of its output."""
 class CellErrorModel(NamedTuple):
     """Statistics of the errors."""
 
-    fixed_degradation: float  # [-] uniform from 0 to this
-    scale_common_error: float  # [-] 1 sigma
-    scale_cell_error: float  # [-] 1 sigma
-    scale: float  # [-] of all cells, the same in every case
-    misalignment: float  # [rad] 1 sigma about each of two axes across the normal
-    bias: float  # [-] 1 sigma
-
-
-def error_model(values: Values) -> CellErrorModel:
-    """Statistics from checked values (`PARAMETERS`)."""
-    return CellErrorModel(
-        fixed_degradation=values.fixed_degradation,
-        scale_common_error=values.scale_common_error,
-        scale_cell_error=values.scale_cell_error,
-        scale=values.scale,
-        misalignment=math.radians(values.misalignment_deg),
-        bias=values.bias,
+    fixed_degradation: float = given(
+        real("fixed_degradation", 0.0, "-", "largest lasting loss of a cell, uniform", low=0.0, high=1.0)
     )
+    scale_common_error: float = given(
+        real("scale_common_error", 0.0, "-", "1 sigma of the scale error of all cells", low=0.0, high=1.0)
+    )
+    scale_cell_error: float = given(
+        real("scale_cell_error", 0.0, "-", "1 sigma of the scale error of each cell", low=0.0, high=1.0)
+    )
+    scale: float = given(  # the same in every case
+        real("scale", 1.0, "-", "output of all cells, relative to what they are calibrated to", low=0.0, high=10.0)
+    )
+    misalignment: float = made(  # [rad] 1 sigma about each of two axes across the normal
+        math.radians,
+        real("misalignment_deg", 0.0, "deg", "1 sigma of the tilt of each normal, per axis", low=0.0, high=45.0),
+    )
+    bias: float = given(real("bias", 0.0, "-", "1 sigma of the constant offset of each cell", low=0.0, high=1.0))
+
+
+PARAMETERS = table_of(CellErrorModel)
+error_model = builder(CellErrorModel)
 
 
 def nominal_cells(normals_b: np.ndarray, side: ArrayLike = 0.0) -> np.ndarray:

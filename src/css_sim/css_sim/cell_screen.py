@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from css_common.schema import Table, Values, integers, real, reals
-from css_environment.albedo import Screen, collar_screen, plane_screen
+from css_environment.albedo import Screen, plane_screen, soft_screen
 
 PARAMETERS: Table = (
     reals("collar.axis", (0.0, 0.0, 0.0), "-", "axis of a collar around some cells, in b; zeros: none", length=3),
@@ -23,7 +23,7 @@ def screen(values: Values) -> Screen:
     """The collar if there is one, else the body plane of the mission's cells."""
     if np.any(values.collar.axis):
         angles = np.radians([values.collar.full_deg, values.collar.dark_deg])
-        return collar_screen(values.collar.axis, *angles.tolist())
+        return soft_screen(values.collar.axis, *angles.tolist())
     return plane_screen(values.cells.clip_normal)
 
 

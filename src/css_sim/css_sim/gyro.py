@@ -8,35 +8,47 @@ bias, scale, misalignment, range and resolution are zero or absent unless asked 
 import math
 from typing import NamedTuple
 
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4
-from css_common.schema import Table, Values, real
+from css_common.schema import real
 from css_common.vectors import Mat3, Vec3, multiply
 from css_sim.random_walk import random_walk
 
-PARAMETERS: Table = (
-    real("bias_deg_h", 1.0, "deg/h", "1 sigma of the constant bias, per axis", low=0.0, high=1e6),
-    real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3),
-    real("bias_walk_deg_s", 0.0, "deg/s", "1 sigma of the change of bias from step to step", low=0.0, high=1.0),
-    real("scale_error", 0.0, "-", "1 sigma of the scale error, per axis", low=0.0, high=1.0),
-    real("misalignment_deg", 0.0, "deg", "1 sigma of each angle between axes", low=0.0, high=10.0),
-    real("range_deg_s", 0.0, "deg/s", "largest rate it can read; 0: any", low=0.0, high=1e6),
-    real("resolution_deg_s", 0.0, "deg/s", "step of its output; 0: continuous", low=0.0, high=1e3),
-)
-
 _RADIANS_PER_SECOND = math.pi / 180.0 / 3600.0
+
+
+def _per_second(rate_deg_h: float) -> float:
+    return rate_deg_h * _RADIANS_PER_SECOND
 
 
 class Gyro(NamedTuple):
     """Statistics and limits; rates in rad/s."""
 
-    bias: float
-    noise: float
-    bias_walk: float
-    scale_error: float
-    misalignment: float  # [rad]
-    range: float
-    resolution: float
+    bias: float = made(
+        _per_second, real("bias_deg_h", 1.0, "deg/h", "1 sigma of the constant bias, per axis", low=0.0, high=1e6)
+    )
+    noise: float = made(
+        math.radians, real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3)
+    )
+    bias_walk: float = made(
+        math.radians,
+        real("bias_walk_deg_s", 0.0, "deg/s", "1 sigma of the change of bias from step to step", low=0.0, high=1.0),
+    )
+    scale_error: float = given(real("scale_error", 0.0, "-", "1 sigma of the scale error, per axis", low=0.0, high=1.0))
+    misalignment: float = made(  # [rad]
+        math.radians, real("misalignment_deg", 0.0, "deg", "1 sigma of each angle between axes", low=0.0, high=10.0)
+    )
+    range: float = made(
+        math.radians, real("range_deg_s", 0.0, "deg/s", "largest rate it can read; 0: any", low=0.0, high=1e6)
+    )
+    resolution: float = made(
+        math.radians, real("resolution_deg_s", 0.0, "deg/s", "step of its output; 0: continuous", low=0.0, high=1e3)
+    )
+
+
+PARAMETERS = table_of(Gyro)
+parameters = builder(Gyro)
 
 
 class GyroErrors(NamedTuple):
@@ -44,19 +56,6 @@ class GyroErrors(NamedTuple):
 
     bias_b: Vec3  # [rad/s] at step 0
     response: Mat3  # what the axes make of the body rate
-
-
-def parameters(values: Values) -> Gyro:
-    """Parameters from checked values (`PARAMETERS`)."""
-    return Gyro(
-        bias=values.bias_deg_h * _RADIANS_PER_SECOND,
-        noise=math.radians(values.noise_deg_s),
-        bias_walk=math.radians(values.bias_walk_deg_s),
-        scale_error=values.scale_error,
-        misalignment=math.radians(values.misalignment_deg),
-        range=math.radians(values.range_deg_s),
-        resolution=math.radians(values.resolution_deg_s),
-    )
 
 
 @kernel
@@ -95,17 +94,22 @@ def _read_out(p: Gyro, rate: float) -> float:
 
 
 @kernel
-def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
-    """Measured body rate [rad/s] at a control cycle."""
+def read(p: Gyro, errors: GyroErrors, bias_b: Vec3, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle, with the bias of that cycle (`bias_at`)."""
     w = multiply(errors.response, omega_bn_b)
-    b = bias_at(p, errors, key, step)
-    x, y, z = w[0] + b[0], w[1] + b[1], w[2] + b[2]
+    x, y, z = w[0] + bias_b[0], w[1] + bias_b[1], w[2] + bias_b[2]
     if p.noise > 0.0:
         n = normal4(key, Stream.GYRO_NOISE, step, 0)
         x += p.noise * n[0]
         y += p.noise * n[1]
         z += p.noise * n[2]
     return (_read_out(p, x), _read_out(p, y), _read_out(p, z))
+
+
+@kernel
+def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle."""
+    return read(p, errors, bias_at(p, errors, key, step), key, step, omega_bn_b)
 
 
 def variance(p: Gyro) -> float:

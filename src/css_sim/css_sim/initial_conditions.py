@@ -11,19 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.attitude import mrp_shadow, quaternion_to_mrp
+from css_common.declared import builder, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Table, Values, choice, real, reals
+from css_common.schema import Values, choice, real, reals
 from css_common.sections import wheel_axes
-from css_common.vectors import Vec3
+from css_common.vectors import Vec3, vector_of
 from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momentum_at_speed
 
-PARAMETERS: Table = (
-    choice("initial.attitude", "random", ("random", "fixed"), "uniform over all attitudes, or initial.sigma_bn"),
-    reals("initial.sigma_bn", (0.0, 0.0, 0.0), "-", "MRP of the fixed attitude, b relative to n", length=3),
-    choice("initial.rate", "random", ("random", "fixed"), "uniform per axis, or initial.omega_deg_s"),
-    real("initial.max_rate_deg_s", 2.0, "deg/s", "bound of the random rate, per axis", low=0.0, high=3600.0),
-    reals("initial.omega_deg_s", (0.0, 0.0, 0.0), "deg/s", "fixed body rate", length=3),
+_DISPERSION = (
     reals("initial.wheel_speed_rpm", (), "rpm", "wheel speeds relative to the body; empty: at rest"),
     real("dispersion.inertia", 0.0, "-", "1 sigma of each principal moment, relative", low=0.0, high=0.2),
     real("dispersion.wheel_torque", 0.0, "-", "1 sigma of each wheel's torque limit, relative", low=0.0, high=0.5),
@@ -32,27 +28,37 @@ PARAMETERS: Table = (
 _RADIANS_PER_RPM = 2.0 * math.pi / 60.0
 
 
+def _rates(omega_deg_s: np.ndarray) -> Vec3:
+    w1, w2, w3 = (math.radians(w) for w in omega_deg_s)
+    return w1, w2, w3
+
+
 class InitialConditions(NamedTuple):
     """How a case begins."""
 
-    random_attitude: bool
-    random_rate: bool
-    sigma_bn: Vec3
-    omega_bn_b: Vec3  # [rad/s]
-    max_rate: float  # [rad/s]
-
-
-def parameters(values: Values) -> InitialConditions:
-    """Initial conditions from checked values (`PARAMETERS`)."""
-    s1, s2, s3 = (float(s) for s in values.initial.sigma_bn)
-    w1, w2, w3 = (math.radians(w) for w in values.initial.omega_deg_s)
-    return InitialConditions(
-        random_attitude=values.initial.attitude == "random",
-        random_rate=values.initial.rate == "random",
-        sigma_bn=(s1, s2, s3),
-        omega_bn_b=(w1, w2, w3),
-        max_rate=math.radians(values.initial.max_rate_deg_s),
+    random_attitude: bool = made(
+        lambda word: word == "random",
+        choice("initial.attitude", "random", ("random", "fixed"), "uniform over all attitudes, or initial.sigma_bn"),
     )
+    sigma_bn: Vec3 = made(
+        vector_of,
+        reals("initial.sigma_bn", (0.0, 0.0, 0.0), "-", "MRP of the fixed attitude, b relative to n", length=3),
+    )
+    random_rate: bool = made(
+        lambda word: word == "random",
+        choice("initial.rate", "random", ("random", "fixed"), "uniform per axis, or initial.omega_deg_s"),
+    )
+    max_rate: float = made(  # [rad/s]
+        math.radians,
+        real("initial.max_rate_deg_s", 2.0, "deg/s", "bound of the random rate, per axis", low=0.0, high=3600.0),
+    )
+    omega_bn_b: Vec3 = made(  # [rad/s]
+        _rates, reals("initial.omega_deg_s", (0.0, 0.0, 0.0), "deg/s", "fixed body rate", length=3)
+    )
+
+
+PARAMETERS = (*table_of(InitialConditions), *_DISPERSION)
+parameters = builder(InitialConditions)
 
 
 def conflicts(values: Values) -> Iterator[str]:

@@ -4,38 +4,31 @@
 import math
 from typing import NamedTuple
 
+from css_common.conversions import tesla
+from css_common.declared import builder, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4
-from css_common.schema import Table, Values, real
+from css_common.schema import real
 from css_common.vectors import Vec3, scale
-
-PARAMETERS: Table = (
-    real("bias_nt", 0.0, "nT", "1 sigma of the constant bias, per axis", low=0.0, high=1e6),
-    real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6),
-    real("resolution_nt", 0.0, "nT", "step of its output; 0: continuous", low=0.0, high=1e6),
-    real("range_nt", 0.0, "nT", "largest field component it can read; 0: any", low=0.0, high=1e9),
-)
-
-_TESLA_PER_NT = 1e-9
 
 
 class Magnetometer(NamedTuple):
     """Statistics and limits [T]."""
 
-    bias: float
-    noise: float
-    resolution: float
-    range: float
-
-
-def parameters(values: Values) -> Magnetometer:
-    """Parameters from checked values (`PARAMETERS`)."""
-    return Magnetometer(
-        bias=values.bias_nt * _TESLA_PER_NT,
-        noise=values.noise_nt * _TESLA_PER_NT,
-        resolution=values.resolution_nt * _TESLA_PER_NT,
-        range=values.range_nt * _TESLA_PER_NT,
+    bias: float = made(tesla, real("bias_nt", 0.0, "nT", "1 sigma of the constant bias, per axis", low=0.0, high=1e6))
+    noise: float = made(
+        tesla, real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6)
     )
+    resolution: float = made(
+        tesla, real("resolution_nt", 0.0, "nT", "step of its output; 0: continuous", low=0.0, high=1e6)
+    )
+    range: float = made(
+        tesla, real("range_nt", 0.0, "nT", "largest field component it can read; 0: any", low=0.0, high=1e9)
+    )
+
+
+PARAMETERS = table_of(Magnetometer)
+parameters = builder(Magnetometer)
 
 
 @kernel

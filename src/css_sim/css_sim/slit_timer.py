@@ -4,36 +4,36 @@
 import math
 from typing import NamedTuple
 
+from css_common.conversions import seconds
+from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Table, Values, real
-
-PARAMETERS: Table = (
-    real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4),
-    real("missed", 0.0, "-", "probability that a crossing gives no pulse", low=0.0, high=1.0),
-    real("double", 0.0, "-", "probability that a crossing gives a second pulse", low=0.0, high=1.0),
-    real("double_delay_us", 300.0, "us", "delay of a second pulse behind the first", low=1.0, high=1e5),
-)
+from css_common.schema import Values, real
 
 WRAP = 2**32
 """Counts after which the 32-bit timer begins anew."""
 
 
+def _frequency(values: Values) -> float:
+    return float(values.slits.counter_hz)
+
+
 class SlitTimer(NamedTuple):
     """Frequency and errors; times in seconds."""
 
-    frequency: float  # [Hz]
-    jitter: float
-    missed: float
-    double: float
-    double_delay: float
-
-
-def parameters(values: Values) -> SlitTimer:
-    """Parameters from checked values (`PARAMETERS` and the mission's `slits`)."""
-    return SlitTimer(
-        values.slits.counter_hz, 1e-6 * values.jitter_us, values.missed, values.double, 1e-6 * values.double_delay_us
+    frequency: float = computed(_frequency)  # [Hz]
+    jitter: float = made(seconds, real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4))
+    missed: float = given(real("missed", 0.0, "-", "probability that a crossing gives no pulse", low=0.0, high=1.0))
+    double: float = given(
+        real("double", 0.0, "-", "probability that a crossing gives a second pulse", low=0.0, high=1.0)
     )
+    double_delay: float = made(
+        seconds, real("double_delay_us", 300.0, "us", "delay of a second pulse behind the first", low=1.0, high=1e5)
+    )
+
+
+PARAMETERS = table_of(SlitTimer)
+parameters = builder(SlitTimer)
 
 
 @kernel

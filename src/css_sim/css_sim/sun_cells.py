@@ -19,55 +19,49 @@ cell, s the Sun in the body frame. Outputs are normalised: 1.0 is the Sun at nor
 import math
 from typing import NamedTuple
 
+from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Table, Values, choice, flag, integer, real
+from css_common.schema import Values, choice, flag, integer, real
 from css_common.vectors import Vec3
 from css_environment.albedo import Screen, transmission
+from css_sim import cell_screen
 from css_sim.cell_faults import apply_faults
-from css_sim.cell_screen import screen
 
-PARAMETERS: Table = (
-    flag("warp", True, "flattened response of O'Keefe & Schaub 2013, Eq. 16"),
-    real("degradation", 0.05, "-", "largest loss of output, drawn anew every step", low=0.0, high=1.0),
-    choice("degradation_mode", "common", ("common", "per_cell"), "one draw for all cells, or one for each"),
-    real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0),
-    real("dropout", 0.0, "-", "light below this level gives no output", low=0.0, high=1.0),
-    real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0),
-    real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0),
-    integer("bits", 0, "-", "resolution between lowest and highest output; 0: continuous", low=0, high=32),
-)
+
+def _cos_half_view(values: Values) -> float:
+    return math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
+
+
+def _levels(bits: int) -> float:
+    return float(2**bits) if bits else 0.0
 
 
 class SunCells(NamedTuple):
     """What all cells have in common in all cases; what differs is in `cell_errors.CELL` and `cell_faults.FAULT`."""
 
-    screen: Screen  # what hides part of the sky
-    cos_half_view: float
-    warp: bool
-    degradation: float
-    degradation_per_cell: bool
-    noise: float
-    dropout: float
-    output_low: float
-    output_high: float
-    levels: float  # steps between lowest and highest output; 0: continuous
-
-
-def parameters(values: Values) -> SunCells:
-    """Parameters of `sample` from checked values (`PARAMETERS`, `cell_screen.PARAMETERS` and the mission's `cells`)."""
-    return SunCells(
-        screen=screen(values),
-        cos_half_view=math.cos(math.radians(0.5 * values.cells.field_of_view_deg)),
-        warp=values.warp,
-        degradation=values.degradation,
-        degradation_per_cell=values.degradation_mode == "per_cell",
-        noise=values.noise,
-        dropout=values.dropout,
-        output_low=values.output_low,
-        output_high=values.output_high,
-        levels=float(2**values.bits) if values.bits else 0.0,
+    screen: Screen = computed(cell_screen.screen)  # what hides part of the sky
+    cos_half_view: float = computed(_cos_half_view)
+    warp: bool = given(flag("warp", True, "flattened response of O'Keefe & Schaub 2013, Eq. 16"))
+    degradation: float = given(
+        real("degradation", 0.05, "-", "largest loss of output, drawn anew every step", low=0.0, high=1.0)
     )
+    degradation_per_cell: bool = made(
+        lambda word: word == "per_cell",
+        choice("degradation_mode", "common", ("common", "per_cell"), "one draw for all cells, or one for each"),
+    )
+    noise: float = given(real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0))
+    dropout: float = given(real("dropout", 0.0, "-", "light below this level gives no output", low=0.0, high=1.0))
+    output_low: float = given(real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0))
+    output_high: float = given(real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0))
+    levels: float = made(  # steps between lowest and highest output; 0: continuous
+        _levels,
+        integer("bits", 0, "-", "resolution between lowest and highest output; 0: continuous", low=0, high=32),
+    )
+
+
+PARAMETERS = table_of(SunCells)
+parameters = builder(SunCells)
 
 
 @kernel

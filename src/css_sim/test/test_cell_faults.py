@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_sim import cell_faults
 from css_sim.cell_faults import (
@@ -28,7 +28,7 @@ CASES = 4000
 
 def values_with(faults=(), **random_faults):
     changes = {f"random_faults__{name}": value for name, value in random_faults.items()}
-    return default_values(MISSION + CELLS + cell_faults.PARAMETERS, faults=list(faults), **changes)
+    return okeefe_values(MISSION + CELLS + cell_faults.PARAMETERS, faults=list(faults), **changes)
 
 
 def faults_with(*texts, key=KEY, **random_faults):

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import mrp_to_dcm
-from css_common.schema import default_values
 from css_environment.constants import EARTH_MU, EARTH_RADIUS, EARTH_ROTATION_RATE
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances
@@ -38,7 +38,7 @@ ENVIRONMENT = EnvironmentState(
 
 
 def build(**changes):
-    return disturbances.parameters(default_values(disturbances.PARAMETERS, **changes))
+    return disturbances.parameters(okeefe_values(disturbances.PARAMETERS, **changes))
 
 
 def panels(areas, normals, centres):
@@ -191,7 +191,7 @@ def test_no_sunlight_pressure_in_eclipse_and_less_far_from_the_sun():
 
 
 def test_conflicts_are_named():
-    values = default_values(
+    values = okeefe_values(
         disturbances.PARAMETERS,
         disturbances__aerodynamic=True,
         panels__normals=[1.0, 1.0, 0.0],
@@ -201,4 +201,4 @@ def test_conflicts_are_named():
     found = "\n".join(conflicts(values))
     for part in ("panels.normals: 1 rows", "row 0 has length 1.41421", "1.2 given", "without panels"):
         assert part in found
-    assert list(conflicts(default_values(disturbances.PARAMETERS))) == []
+    assert list(conflicts(okeefe_values(disturbances.PARAMETERS))) == []

@@ -7,6 +7,7 @@ their distances from the median (significance 1e-4 over all pairs, fixed seed).
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.random_streams import Stream, random_key
@@ -120,7 +121,7 @@ def slit_draws(key, timer):
 def draws():
     """Names of the columns, and what was drawn, (cases, columns)."""
     nominal = cell_errors.nominal_cells(np.tile([0.0, 0.0, 1.0], (CELLS_DRAWN, 1)))
-    cells = default_values(
+    cells = okeefe_values(
         CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS,
         warp=False,
         degradation=0.0,
@@ -128,7 +129,7 @@ def draws():
         output_high=10.0,
     )
     quiet = sun_cells.parameters(cells)
-    start = default_values(
+    start = okeefe_values(
         MISSION + SPACECRAFT + WHEELS + initial_conditions.PARAMETERS,
         dispersion__inertia=0.01,
         dispersion__wheel_torque=0.1,

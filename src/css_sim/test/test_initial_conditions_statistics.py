@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.attitude import mrp_to_dcm
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import MISSION, SPACECRAFT, WHEELS
 from css_sim import initial_conditions
 from css_sim.rigid_body import wheel_speed
@@ -19,7 +19,7 @@ CASES = 20_000
 
 
 def build(**changes):
-    return default_values(MISSION + SPACECRAFT + WHEELS + initial_conditions.PARAMETERS, **changes)
+    return okeefe_values(MISSION + SPACECRAFT + WHEELS + initial_conditions.PARAMETERS, **changes)
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,12 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from scipy.spatial.transform import Rotation
 
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import codec_of
 from css_common.component import Component
-from css_common.schema import checked_values, shaped_values
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
@@ -19,9 +19,8 @@ from css_sim.nodes.magnetometer import Magnetometer
 
 def build(kind: type[Component], **changes):
     """A component with parameters by dotted name, `__` for the dot."""
-    given = {name.replace("__", "."): value for name, value in changes.items()}
-    given = {name: value for name, value in given.items() if any(p.name == name for p in kind.table())}
-    values = shaped_values(kind.table(), checked_values(kind.table(), given))
+    names = {p.name.replace(".", "__") for p in kind.table()}
+    values = okeefe_values(kind.table(), **{name: value for name, value in changes.items() if name in names})
     assert list(kind.conflicts(values)) == []
     return kind(kind.__name__.lower(), values)
 
@@ -145,8 +144,7 @@ def test_faults_can_be_set_in_flight():
     messages = truths(2)
     array = build(CssArray, degradation=0.0)
     array.cycle(messages[0].stamp_ns, {"truth": messages[0]})
-    given = {"faults": ["0 stuck 0.7", "3 dead"], "degradation": 0.0}
-    array.tune(shaped_values(CssArray.table(), checked_values(CssArray.table(), given)))
+    array.tune(okeefe_values(CssArray.table(), faults=["0 stuck 0.7", "3 dead"], degradation=0.0))
     voltages = array.cycle(messages[1].stamp_ns, {"truth": messages[1]})["voltages"].voltages
     assert voltages[0] == 0.7 and voltages[3] == 0.0
 
@@ -158,9 +156,8 @@ def test_drawn_failures_are_those_of_the_case_and_stay_when_faults_are_set_in_fl
     for case in range(6):
         array = build(CssArray, mission__case=case, **random_faults)
         failed.append(outputs(array, messages[:1], "voltages")[0].voltages == 0.33)
-        given = {name.replace("__", "."): v for name, v in random_faults.items()} | {"mission.case": case}
-        given["faults"] = ["0 stuck 0.7", "1 stuck 0.7", "2 stuck 0.7"]
-        array.tune(shaped_values(CssArray.table(), checked_values(CssArray.table(), given)))
+        stuck = ["0 stuck 0.7", "1 stuck 0.7", "2 stuck 0.7"]
+        array.tune(okeefe_values(CssArray.table(), mission__case=case, faults=stuck, **random_faults))
         voltages = outputs(array, messages[1:], "voltages")[0].voltages
         assert np.array_equal(voltages == 0.33, failed[-1])
         assert np.all(voltages[:3][~failed[-1][:3]] == 0.7)
@@ -182,5 +179,5 @@ def test_drawn_failures_are_those_of_the_case_and_stay_when_faults_are_set_in_fl
     ],
 )
 def test_wrong_values_are_refused_with_their_name(kind, given, message):
-    values = shaped_values(kind.table(), checked_values(kind.table(), given))
+    values = okeefe_values(kind.table(), **{name.replace(".", "__"): value for name, value in given.items()})
     assert any(message in conflict for conflict in kind.conflicts(values))

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import mrp_to_dcm
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import MISSION, RODS, SPACECRAFT, WHEELS
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances, initial_conditions
@@ -25,7 +25,7 @@ COMMAND = np.array([0.01, -0.02, 0.005, 0.0])
 
 
 def build(**changes):
-    return spacecraft(default_values(TABLE, **changes), random_key(1, 0))
+    return spacecraft(okeefe_values(TABLE, **changes), random_key(1, 0))
 
 
 def fly(craft, rods=(), steps=1):

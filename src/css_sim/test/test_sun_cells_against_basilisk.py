@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import mrp_to_dcm
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_common.vectors import multiply
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
@@ -25,7 +25,7 @@ CASES = [case for case in REFERENCE["cases"] if case["kellyFactor"] == 0.0]
 
 def outputs(case, faults=()):
     """Our output for a Basilisk case."""
-    values = default_values(
+    values = okeefe_values(
         MISSION + CELLS + sun_cells.PARAMETERS + cell_faults.PARAMETERS + cell_screen.PARAMETERS,
         cells__normals=case["nHat_B"],
         cells__field_of_view_deg=min(180.0, math.degrees(2.0 * case["fov"])),

@@ -6,9 +6,9 @@ import math
 import numba
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_sim import cell_errors, cell_screen, sun_cells
 from css_sim.cell_faults import NO_FAULTS
@@ -19,7 +19,7 @@ PLAIN = {"warp": False, "degradation": 0.0}
 
 def build(**changes):
     """Parameters and nominal cells of the paper's spacecraft."""
-    values = default_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS, **changes)
+    values = okeefe_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS, **changes)
     return sun_cells.parameters(values), cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
 
 
@@ -121,12 +121,12 @@ def test_collar_dims_its_cells_alone():
 
 def test_conflicts_of_a_collar_are_named():
     table = MISSION + CELLS + cell_screen.PARAMETERS
-    values = default_values(table, collar__axis=[0.0, 0.0, 2.0], collar__cells=[3, 8], collar__full_deg=50.0)
+    values = okeefe_values(table, collar__axis=[0.0, 0.0, 2.0], collar__cells=[3, 8], collar__full_deg=50.0)
     found = "\n".join(cell_screen.conflicts(values))
     for part in ("length 2", "cells.clip_normal", "8 given, expected numbers from 0 to 7", "50 given"):
         assert part in found
-    assert "without" in next(cell_screen.conflicts(default_values(table, collar__cells=[1])))
-    assert list(cell_screen.conflicts(default_values(table))) == []
+    assert "without" in next(cell_screen.conflicts(okeefe_values(table, collar__cells=[1])))
+    assert list(cell_screen.conflicts(okeefe_values(table))) == []
 
 
 def test_eclipse_leaves_nothing_and_distance_scales():

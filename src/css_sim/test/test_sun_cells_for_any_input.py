@@ -6,9 +6,9 @@ import math
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import CELLS, MISSION
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
 
@@ -22,7 +22,7 @@ def set_ups(draw):
     """Parameters, cells and faults with every effect possibly on."""
     low = draw(st.floats(-1.0, 0.5))
     own = sun_cells.PARAMETERS + cell_faults.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS
-    values = default_values(
+    values = okeefe_values(
         MISSION + CELLS + own,
         warp=draw(st.booleans()),
         degradation=draw(fraction),
@@ -66,7 +66,7 @@ def test_outputs_are_numbers_inside_the_limits_and_flagged_at_the_top(set_up, su
 @given(st.floats(0.0, math.pi), st.floats(-math.pi, math.pi), st.floats(0.0, 1.4), st.floats(0.01, 0.99))
 def test_more_light_never_reads_less(polar, azimuth, intensity, part):
     # the warp of Eq. 16 rises with the output it bends, so the whole chain does
-    values = default_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS)
+    values = okeefe_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS)
     p = sun_cells.parameters(values)
     cells = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
     sun_b = (math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar))

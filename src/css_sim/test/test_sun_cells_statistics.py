@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.random_streams import random_key
-from css_common.schema import default_values
 from css_common.sections import CELLS
 from css_sim import cell_errors, cell_screen, sun_cells
 from css_sim.cell_faults import NO_FAULTS
@@ -22,7 +22,7 @@ LIGHT = np.full(8, 0.6)
 def build(**changes):
     """Parameters, error statistics and nominal cells."""
     changes = {"warp": False, "degradation": 0.0, "output_low": -10.0, "output_high": 10.0} | changes
-    values = default_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS, **changes)
+    values = okeefe_values(CELLS + sun_cells.PARAMETERS + cell_screen.PARAMETERS + cell_errors.PARAMETERS, **changes)
     nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
     return sun_cells.parameters(values), cell_errors.error_model(values), nominal
 

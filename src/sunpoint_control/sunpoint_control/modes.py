@@ -19,56 +19,26 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, flag, integer, real
+from css_common.schema import Values, flag, integer, real
 from css_common.vectors import Vec3
 
-PARAMETERS: Table = (
-    flag("enabled", True, "off: safe mode, actuators at rest", tunable=True),
-    integer("modes.debounce", 3, "samples", "samples in a row that must want another mode", low=2, high=1000),
-    real(
-        "modes.detumble_rate_deg_s",
-        10.0,
-        "deg/s",
-        "body rate above which it is damped first",
-        low=0.0,
-        high=360.0,
-    ),
-    real(
-        "modes.detumble_exit_rate_deg_s",
-        5.0,
-        "deg/s",
-        "body rate below which pointing resumes",
-        low=0.0,
-        high=360.0,
-    ),
-    real(
-        "modes.point_angle_deg",
-        15.0,
-        "deg",
-        "pointing error below which it is on the Sun",
-        low=0.0,
-        high=180.0,
-    ),
-    real(
-        "modes.acquire_angle_deg",
-        30.0,
-        "deg",
-        "pointing error above which it no longer is",
-        low=0.0,
-        high=180.0,
-    ),
-    real("modes.search_wait", 20.0, "s", "sunlit time without Sun before the search begins", low=0.0, high=1e4),
-    real("modes.search_rate_deg_s", 1.0, "deg/s", "body rate of the search", low=0.01, high=2.0),
-    real(
-        "modes.search_angle_deg",
-        360.0,
-        "deg",
-        "rotation about one axis before the next",
-        low=1.0,
-        high=3600.0,
-    ),
-    real("modes.search_lit_time", 1.0, "s", "time with a valid Sun that ends the search", low=0.0, high=1e3),
+_DETUMBLE_RATE = real(
+    "modes.detumble_rate_deg_s", 10.0, "deg/s", "body rate above which it is damped first", low=0.0, high=360.0
+)
+_DETUMBLE_EXIT_RATE = real(
+    "modes.detumble_exit_rate_deg_s", 5.0, "deg/s", "body rate below which pointing resumes", low=0.0, high=360.0
+)
+_POINT_ANGLE = real(
+    "modes.point_angle_deg", 15.0, "deg", "pointing error below which it is on the Sun", low=0.0, high=180.0
+)
+_ACQUIRE_ANGLE = real(
+    "modes.acquire_angle_deg", 30.0, "deg", "pointing error above which it no longer is", low=0.0, high=180.0
+)
+_SEARCH_RATE = real("modes.search_rate_deg_s", 1.0, "deg/s", "body rate of the search", low=0.01, high=2.0)
+_SEARCH_ANGLE = real(
+    "modes.search_angle_deg", 360.0, "deg", "rotation about one axis before the next", low=1.0, high=3600.0
 )
 
 # The numbers of css_msgs/ControlStatus.
@@ -93,18 +63,28 @@ _SEARCH_PHASES = 3
 
 
 class ModeParameters(NamedTuple):
-    """Built by `parameters`; rates in rad/s, angles in rad, times in s."""
+    """Rates in rad/s, angles in rad, times in s."""
 
-    enabled: bool
-    debounce: int
-    detumble_rate: float
-    detumble_exit_rate: float
-    point_angle: float
-    acquire_angle: float
-    search_wait: float
-    search_rate: float
-    search_phase_time: float
-    search_lit_time: float
+    enabled: bool = given(flag("enabled", True, "off: safe mode, actuators at rest", tunable=True))
+    debounce: int = given(
+        integer("modes.debounce", 3, "samples", "samples in a row that must want another mode", low=2, high=1000)
+    )
+    detumble_rate: float = made(math.radians, _DETUMBLE_RATE)
+    detumble_exit_rate: float = made(math.radians, _DETUMBLE_EXIT_RATE)
+    point_angle: float = made(math.radians, _POINT_ANGLE)
+    acquire_angle: float = made(math.radians, _ACQUIRE_ANGLE)
+    search_wait: float = given(
+        real("modes.search_wait", 20.0, "s", "sunlit time without Sun before the search begins", low=0.0, high=1e4)
+    )
+    search_rate: float = made(math.radians, _SEARCH_RATE)
+    search_phase_time: float = made(lambda angle, rate: angle / rate, _SEARCH_ANGLE, _SEARCH_RATE)
+    search_lit_time: float = given(
+        real("modes.search_lit_time", 1.0, "s", "time with a valid Sun that ends the search", low=0.0, high=1e3)
+    )
+
+
+PARAMETERS = table_of(ModeParameters)
+parameters = builder(ModeParameters)
 
 
 class ModeState(NamedTuple):
@@ -119,29 +99,11 @@ class ModeState(NamedTuple):
     search_time: float  # [s] in the search script
 
 
-def parameters(values: Values) -> ModeParameters:
-    """Parameters from checked values."""
-    m = values.modes
-    return ModeParameters(
-        enabled=values.enabled,
-        debounce=m.debounce,
-        detumble_rate=math.radians(m.detumble_rate_deg_s),
-        detumble_exit_rate=math.radians(m.detumble_exit_rate_deg_s),
-        point_angle=math.radians(m.point_angle_deg),
-        acquire_angle=math.radians(m.acquire_angle_deg),
-        search_wait=m.search_wait,
-        search_rate=math.radians(m.search_rate_deg_s),
-        search_phase_time=m.search_angle_deg / m.search_rate_deg_s,
-        search_lit_time=m.search_lit_time,
-    )
-
-
 def conflicts(values: Values) -> Iterator[str]:
     """Thresholds whose hysteresis is upside down, one message each."""
-    m = values.modes
-    if m.detumble_exit_rate_deg_s > m.detumble_rate_deg_s:
+    if values[_DETUMBLE_EXIT_RATE] > values[_DETUMBLE_RATE]:
         yield "modes.detumble_exit_rate_deg_s: above modes.detumble_rate_deg_s, expected at most that"
-    if m.point_angle_deg > m.acquire_angle_deg:
+    if values[_POINT_ANGLE] > values[_ACQUIRE_ANGLE]:
         yield "modes.point_angle_deg: above modes.acquire_angle_deg, expected at most that"
 
 

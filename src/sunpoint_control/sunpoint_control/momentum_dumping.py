@@ -16,17 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, flag, real
+from css_common.schema import Values, choice, flag, real
 from css_common.vectors import Vec3, add, axes_across, cross, dot, norm, row, scale, subtract, unit
 from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
 
-PARAMETERS: Table = (
-    flag("dumping.enabled", False, "dump wheel momentum with the torque rods", tunable=True),
-    choice("dumping.when", "always", ("always", "eclipse"), "at all times, or in the shadow alone", tunable=True),
-    real("dumping.gain", 0.005, "1/s", "despin gain c", low=0.0, high=10.0, tunable=True),
-    real("dumping.reference_speed_rpm", 0.0, "rpm", "wheel speed to dump to", low=-1e5, high=1e5, tunable=True),
-)
+ENABLED = flag("dumping.enabled", False, "dump wheel momentum with the torque rods", tunable=True)
 
 _RPM = math.pi / 30.0
 # Determinant relative to the squared trace below which the rods act along one direction only.
@@ -34,29 +30,38 @@ _RANK_ONE = 1e-10
 _NO_FIELD = 1e-9  # [T]
 
 
+def _wheel_inertia(values: Values) -> float:
+    return float(values.wheels.inertia)
+
+
+def _rod_axes(values: Values) -> np.ndarray:
+    return np.ascontiguousarray(values.rods.axes, dtype=np.float64)
+
+
+def _max_dipole(values: Values) -> float:
+    return float(values.rods.max_dipole)
+
+
 class DumpingParameters(NamedTuple):
-    """Built by `parameters`."""
+    """How momentum is dumped, with the mission's `wheels` and `rods`."""
 
-    enabled: bool
-    in_eclipse_only: bool
-    gain: float  # [1/s]
-    reference_speed: float  # [rad/s]
-    wheel_inertia: float  # [kg m^2]
-    rod_axes_b: np.ndarray  # (m, 3)
-    max_dipole: float  # [A m^2]
-
-
-def parameters(values: Values) -> DumpingParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `wheels` and `rods`)."""
-    return DumpingParameters(
-        enabled=values.dumping.enabled,
-        in_eclipse_only=values.dumping.when == "eclipse",
-        gain=values.dumping.gain,
-        reference_speed=values.dumping.reference_speed_rpm * _RPM,
-        wheel_inertia=values.wheels.inertia,
-        rod_axes_b=np.ascontiguousarray(values.rods.axes, dtype=np.float64),
-        max_dipole=values.rods.max_dipole,
+    enabled: bool = given(ENABLED)
+    in_eclipse_only: bool = made(
+        lambda word: word == "eclipse",
+        choice("dumping.when", "always", ("always", "eclipse"), "at all times, or in the shadow alone", tunable=True),
     )
+    gain: float = given(real("dumping.gain", 0.005, "1/s", "despin gain c", low=0.0, high=10.0, tunable=True))
+    reference_speed: float = made(  # [rad/s]
+        lambda rpm: rpm * _RPM,
+        real("dumping.reference_speed_rpm", 0.0, "rpm", "wheel speed to dump to", low=-1e5, high=1e5, tunable=True),
+    )
+    wheel_inertia: float = computed(_wheel_inertia)  # [kg m^2]
+    rod_axes_b: np.ndarray = computed(_rod_axes)  # (m, 3)
+    max_dipole: float = computed(_max_dipole)  # [A m^2]
+
+
+PARAMETERS = table_of(DumpingParameters)
+parameters = builder(DumpingParameters)
 
 
 @kernel

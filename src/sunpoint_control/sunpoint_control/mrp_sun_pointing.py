@@ -18,57 +18,54 @@ gyroscopic terms leave the Lyapunov function, whose rate is then -(omega + K_I z
 import math
 from typing import NamedTuple
 
+from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, real
-from css_common.vectors import Mat3, Vec3, add, cross, dot, mat3, multiply, norm, scale, unit
-
-PARAMETERS: Table = (
-    real("gains.k", 0.148, "N m", "attitude gain K", low=0.0, tunable=True),
-    real("gains.p", 0.9, "N m s", "rate gain P, the same on all axes", low=0.0, tunable=True),
-    real("gains.ki", 1e-4, "1/(kg m^2)", "integral gain K_I", low=0.0, tunable=True),
-    real("gains.integral_limit", 10.0, "N m s", "bound on each axis of K int(sigma) dt", low=0.0, tunable=True),
-    real(
-        "deadband_deg",
-        15.0,
-        "deg",
-        "no attitude control while the estimated Sun is closer to the array normal",
-        low=0.0,
-        high=180.0,
-        tunable=True,
-    ),
-    choice("deadband_behaviour", "zero", ("zero", "damp"), "torque in the deadband: none, or rate damping alone"),
-)
+from css_common.schema import Values, choice, real
+from css_common.vectors import Mat3, Vec3, add, cross, dot, mat3, multiply, norm, scale, unit, vector_of
 
 # Sine of an angle between Sun and array normal at which they no longer span a plane.
 _ALIGNED = 1e-6
 
 
+def _inertia(values: Values) -> Mat3:
+    return mat3(values.spacecraft.inertia)
+
+
+def _array_normal(values: Values) -> Vec3:
+    return vector_of(values.spacecraft.array_normal)
+
+
 class PointingParameters(NamedTuple):
-    """Built by `parameters`."""
+    """The law's gains and the body that it turns, the mission's `spacecraft`."""
 
-    k: float
-    p: float
-    ki: float
-    integral_limit: float
-    inertia_b: Mat3  # [kg m^2]
-    array_normal_b: Vec3
-    deadband: float  # [rad]
-    damp_in_deadband: bool
-
-
-def parameters(values: Values) -> PointingParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `spacecraft`)."""
-    x, y, z = (float(c) for c in values.spacecraft.array_normal)
-    return PointingParameters(
-        k=values.gains.k,
-        p=values.gains.p,
-        ki=values.gains.ki,
-        integral_limit=values.gains.integral_limit,
-        inertia_b=mat3(values.spacecraft.inertia),
-        array_normal_b=(x, y, z),
-        deadband=math.radians(values.deadband_deg),
-        damp_in_deadband=values.deadband_behaviour == "damp",
+    k: float = given(real("gains.k", 0.148, "N m", "attitude gain K", low=0.0, tunable=True))
+    p: float = given(real("gains.p", 0.9, "N m s", "rate gain P, the same on all axes", low=0.0, tunable=True))
+    ki: float = given(real("gains.ki", 1e-4, "1/(kg m^2)", "integral gain K_I", low=0.0, tunable=True))
+    integral_limit: float = given(
+        real("gains.integral_limit", 10.0, "N m s", "bound on each axis of K int(sigma) dt", low=0.0, tunable=True)
     )
+    inertia_b: Mat3 = computed(_inertia)  # [kg m^2]
+    array_normal_b: Vec3 = computed(_array_normal)
+    deadband: float = made(  # [rad]
+        math.radians,
+        real(
+            "deadband_deg",
+            15.0,
+            "deg",
+            "no attitude control while the estimated Sun is closer to the array normal",
+            low=0.0,
+            high=180.0,
+            tunable=True,
+        ),
+    )
+    damp_in_deadband: bool = made(
+        lambda word: word == "damp",
+        choice("deadband_behaviour", "zero", ("zero", "damp"), "torque in the deadband: none, or rate damping alone"),
+    )
+
+
+PARAMETERS = table_of(PointingParameters)
+parameters = builder(PointingParameters)
 
 
 @kernel

@@ -9,10 +9,11 @@ import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from css_common.declared import builder, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice
+from css_common.schema import Values, choice
 from css_common.vectors import Vec3, norm
-from sunpoint_control import modes, momentum_dumping, mrp_sun_pointing, wheel_allocation
+from sunpoint_control import modes
 from sunpoint_control.modes import (
     MODE_DETUMBLE,
     MODE_ECLIPSE,
@@ -23,7 +24,7 @@ from sunpoint_control.modes import (
     next_mode,
     search_rate,
 )
-from sunpoint_control.momentum_dumping import DumpingParameters, add_dumping
+from sunpoint_control.momentum_dumping import ENABLED, DumpingParameters, add_dumping
 from sunpoint_control.mrp_sun_pointing import (
     PointingParameters,
     damping_torque,
@@ -31,21 +32,7 @@ from sunpoint_control.mrp_sun_pointing import (
     integrate_error,
     pointing_torque,
 )
-from sunpoint_control.wheel_allocation import AllocationParameters, allocate, limit_torques, wheel_momentum
-
-PARAMETERS: Table = (
-    *mrp_sun_pointing.PARAMETERS,
-    choice(
-        "eclipse_behaviour",
-        "rate_damp",
-        ("coast", "rate_damp", "hold_attitude"),
-        "in the shadow: no torque, rate damping, or pointing at the propagated Sun",
-        tunable=True,
-    ),
-    *wheel_allocation.PARAMETERS,
-    *modes.PARAMETERS,
-    *momentum_dumping.PARAMETERS,
-)
+from sunpoint_control.wheel_allocation import WHEELS_OUT, AllocationParameters, allocate, limit_torques, wheel_momentum
 
 # The numbers of css_msgs/SunEstimate.
 _VALIDITY_NONE = 0
@@ -66,13 +53,26 @@ _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
 
 class ControlParameters(NamedTuple):
-    """Built by `parameters`."""
+    """All of the control."""
 
-    pointing: PointingParameters
-    eclipse_behaviour: int
-    allocation: AllocationParameters
-    modes: ModeParameters
-    dumping: DumpingParameters
+    pointing: PointingParameters = part(PointingParameters)
+    eclipse_behaviour: int = made(
+        _ECLIPSE.__getitem__,
+        choice(
+            "eclipse_behaviour",
+            "rate_damp",
+            tuple(_ECLIPSE),
+            "in the shadow: no torque, rate damping, or pointing at the propagated Sun",
+            tunable=True,
+        ),
+    )
+    allocation: AllocationParameters = part(AllocationParameters)
+    modes: ModeParameters = part(ModeParameters)
+    dumping: DumpingParameters = part(DumpingParameters)
+
+
+PARAMETERS = table_of(ControlParameters)
+parameters = builder(ControlParameters)
 
 
 class ControlState(NamedTuple):
@@ -98,27 +98,16 @@ class ControlOutput(NamedTuple):
     rods_saturated: int  # bit i: rod i was asked for more than it may give
 
 
-def parameters(values: Values) -> ControlParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `spacecraft`, `wheels`, `rods`)."""
-    return ControlParameters(
-        pointing=mrp_sun_pointing.parameters(values),
-        eclipse_behaviour=_ECLIPSE[values.eclipse_behaviour],
-        allocation=wheel_allocation.parameters(values),
-        modes=modes.parameters(values),
-        dumping=momentum_dumping.parameters(values),
-    )
-
-
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between parameters, one message each."""
     yield from modes.conflicts(values)
     if not values.wheels.fitted:
         yield "wheels.fitted: false, but the control turns the spacecraft with its wheels"
     count = len(values.wheels.axes)
-    for index in values.wheels_out:
+    for index in values[WHEELS_OUT]:
         if index >= count:
             yield f"wheels_out: wheel {index} given, the mission has wheels 0 to {count - 1}"
-    if values.dumping.enabled and not values.rods.fitted:
+    if values[ENABLED] and not values.rods.fitted:
         yield "dumping.enabled: true, but rods.fitted says that the spacecraft has no torque rods"
 
 

@@ -11,32 +11,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import builder, computed, made, table_of
 from css_common.kernel import kernel
-from css_common.schema import Table, Values, choice, integers
+from css_common.schema import Values, choice, integers
 from css_common.vectors import Vec3, dot
 
-PARAMETERS: Table = (
-    choice(
-        "wheel_saturation",
-        "scale",
-        ("scale", "clip"),
-        "beyond the torque limit: scale all wheels, or clip each",
-        tunable=True,
-    ),
-    integers("wheels_out", (), "-", "indices of wheels out of service, from 0", low=0, high=31, tunable=True),
-)
-
+WHEELS_OUT = integers("wheels_out", (), "-", "indices of wheels out of service, from 0", low=0, high=31, tunable=True)
 
 WHEEL = np.dtype([(name, np.float64) for name in ("gx", "gy", "gz", "mx", "my", "mz")], align=True)
 """One wheel: unit spin axis in b, and its row of the pseudo-inverse of Gs; zeros: out of service."""
-
-
-class AllocationParameters(NamedTuple):
-    """Built by `parameters`."""
-
-    wheels: np.ndarray  # (n,) of WHEEL: one array, because each one in a parameter costs time at every call
-    max_torque: float  # [N m] of each wheel
-    keep_direction: bool
 
 
 def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
@@ -48,17 +31,38 @@ def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
     return inverse
 
 
-def parameters(values: Values) -> AllocationParameters:
-    """Parameters from checked values (`PARAMETERS` and the mission's `wheels`)."""
+def _wheels(values: Values) -> np.ndarray:
     axes_b = np.asarray(values.wheels.axes, dtype=np.float64)
     wheels = np.zeros(len(axes_b), WHEEL)
     wheels["gx"], wheels["gy"], wheels["gz"] = axes_b.T
-    wheels["mx"], wheels["my"], wheels["mz"] = pseudo_inverse(axes_b, values.wheels_out).T
-    return AllocationParameters(
-        wheels=wheels,
-        max_torque=values.wheels.max_torque,
-        keep_direction=values.wheel_saturation == "scale",
+    wheels["mx"], wheels["my"], wheels["mz"] = pseudo_inverse(axes_b, values[WHEELS_OUT]).T
+    return wheels
+
+
+def _max_torque(values: Values) -> float:
+    return float(values.wheels.max_torque)
+
+
+class AllocationParameters(NamedTuple):
+    """The mission's `wheels`, and how they share a torque."""
+
+    keep_direction: bool = made(
+        lambda word: word == "scale",
+        choice(
+            "wheel_saturation",
+            "scale",
+            ("scale", "clip"),
+            "beyond the torque limit: scale all wheels, or clip each",
+            tunable=True,
+        ),
     )
+    # (n,) of WHEEL: one array, because each one in a parameter costs time at every call
+    wheels: np.ndarray = computed(_wheels, WHEELS_OUT)
+    max_torque: float = computed(_max_torque)  # [N m] of each wheel
+
+
+PARAMETERS = table_of(AllocationParameters)
+parameters = builder(AllocationParameters)
 
 
 @kernel

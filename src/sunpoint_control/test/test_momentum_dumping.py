@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 
-from css_common.schema import default_values
 from css_common.sections import RODS, WHEELS
 from sunpoint_control import momentum_dumping, wheel_allocation
 from sunpoint_control.momentum_dumping import add_dumping, rod_dipoles, rod_torque
 
-AXES = np.asarray(default_values(WHEELS).wheels.axes)
+AXES = np.asarray(okeefe_values(WHEELS).wheels.axes)
 component = st.floats(-1.0, 1.0)
 vector = st.tuples(component, component, component)
 fields = vector.filter(lambda b: np.linalg.norm(b) > 0.05).map(lambda b: tuple(5e-5 * c for c in b))
@@ -21,7 +21,7 @@ speeds4 = st.tuples(speed, speed, speed, speed)
 
 def parameters(**changes):
     table = WHEELS + RODS + wheel_allocation.PARAMETERS + momentum_dumping.PARAMETERS
-    values = default_values(table, dumping__enabled=True, rods__fitted=True, **changes)
+    values = okeefe_values(table, dumping__enabled=True, rods__fitted=True, **changes)
     return momentum_dumping.parameters(values), wheel_allocation.parameters(values)
 
 

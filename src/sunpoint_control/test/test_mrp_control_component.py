@@ -3,18 +3,17 @@
 
 import numpy as np
 import pytest
+from okeefe_spacecraft import okeefe_values
 from sensor_msgs.msg import MagneticField
 
 from css_common.codec import codec_of
-from css_common.schema import checked_values, shaped_values
 from css_msgs.msg import ControlStatus, SunEstimate, WheelState
 from sunpoint_control.modes import MODE_SAFE, MODE_SUN_ACQUISITION, REASON_COMMANDED
 from sunpoint_control.nodes.mrp_control import MrpControl
 
 
 def values_of(**changes):
-    given = {name.replace("__", "."): value for name, value in changes.items()}
-    return shaped_values(MrpControl.table(), checked_values(MrpControl.table(), given))
+    return okeefe_values(MrpControl.table(), **changes)
 
 
 def build(**changes):

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 from scipy.integrate import solve_ivp
 
 from css_common.attitude import mrp_rate, mrp_shadow, mrp_to_dcm
-from css_common.schema import default_values
 from css_common.sections import SPACECRAFT
 from css_common.vectors import cross, dot, multiply, norm, unit
 from sunpoint_control import mrp_sun_pointing
@@ -23,7 +23,7 @@ directions = st.tuples(component, component, component).filter(lambda v: norm(v)
 
 
 def parameters(**changes):
-    return mrp_sun_pointing.parameters(default_values(SPACECRAFT + mrp_sun_pointing.PARAMETERS, **changes))
+    return mrp_sun_pointing.parameters(okeefe_values(SPACECRAFT + mrp_sun_pointing.PARAMETERS, **changes))
 
 
 @given(directions, directions)

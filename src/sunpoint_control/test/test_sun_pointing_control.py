@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 from scipy.integrate import solve_ivp
 
 from css_common.attitude import mrp_rate, mrp_shadow, mrp_to_dcm
-from css_common.schema import default_values
 from css_common.sections import RODS, SPACECRAFT, WHEELS
 from css_common.vectors import angle_between, multiply
 from sunpoint_control import sun_pointing_control as control
 from sunpoint_control.modes import MODE_ECLIPSE, MODE_SAFE, MODE_SUN_ACQUISITION, MODE_SUN_POINT, MODE_SUN_SEARCH
 
 TABLE = SPACECRAFT + WHEELS + RODS + control.PARAMETERS
-AXES = np.asarray(default_values(WHEELS).wheels.axes)
+AXES = np.asarray(okeefe_values(WHEELS).wheels.axes)
 INERTIA = np.diag((10.5, 8.0, 6.75))
 DT = 0.1
 NONE, HELD, VALID = 0, 1, 2
@@ -31,7 +31,7 @@ class Cycle:
     """A control fed with samples; what a sample does not say is a valid Sun at 60 deg, with gyro."""
 
     def __init__(self, **changes):
-        self.p = control.parameters(default_values(TABLE, **changes))
+        self.p = control.parameters(okeefe_values(TABLE, **changes))
         self.state = control.initial_state(self.p)
         self.torques = np.full(4, np.nan)
         self.dipoles = np.full(3, np.nan)

@@ -9,20 +9,20 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from okeefe_spacecraft import okeefe_values
 
-from css_common.schema import default_values
 from css_common.sections import WHEELS
 from sunpoint_control import wheel_allocation
 from sunpoint_control.wheel_allocation import WHEEL, allocate, limit_torques, pseudo_inverse, wheel_momentum
 
 PARITY = json.loads((Path(__file__).parent / "data" / "rw_motor_torque.json").read_text())
-PAPER_AXES = np.asarray(default_values(WHEELS).wheels.axes)
+PAPER_AXES = np.asarray(okeefe_values(WHEELS).wheels.axes)
 torque = st.floats(-0.2, 0.2)
 
 
 def allocation(axes=None, out=(), **changes):
     """Parameters, also for axes that are no unit vectors."""
-    p = wheel_allocation.parameters(default_values(WHEELS + wheel_allocation.PARAMETERS, **changes))
+    p = wheel_allocation.parameters(okeefe_values(WHEELS + wheel_allocation.PARAMETERS, **changes))
     axes = PAPER_AXES if axes is None else np.asarray(axes)
     wheels = np.zeros(len(axes), WHEEL)
     wheels["gx"], wheels["gy"], wheels["gz"] = axes.T

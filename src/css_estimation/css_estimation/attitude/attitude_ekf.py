@@ -9,11 +9,16 @@ turns with the mean of the gyro's readings at both ends, which is exact for a ra
 It begins, and begins anew, from the Sun and the field together (`attitude_start`): when it has never had an attitude,
 when a step was too long to be bridged, when its uncertainty has grown beyond use, and when the field or the Sun has
 contradicted it for too long.
+
+An attitude filter is a module with `parameters(values)`, `initial_state(p)`, `initial_memory(p)` and the kernel `step`
+below. What `parameters` returns is a NamedTuple that the module itself defines: by its type a study finds the module.
 """
 
 from css_common.attitude import dcm_to_mrp, mrp_add, rotation_vector_to_dcm, rotation_vector_to_mrp
 from css_common.kernel import kernel
+from css_common.schema import Values
 from css_common.vectors import Vec3, add, scale, subtract
+from css_estimation.attitude import attitude_options, attitude_solution
 from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters
 from css_estimation.attitude.attitude_solution import (
     MODE_LOST,
@@ -51,6 +56,27 @@ from css_estimation.symmetric import isotropic, trace
 # Trace of the attitude covariance [rad^2] beyond which a fresh start is better: 33 deg for each axis.
 _USELESS = 1.0
 _LONGEST_SPAN = 1e9
+
+
+class AttitudeEkf(AttitudeParameters):
+    """The parameters of this filter."""
+
+    __slots__ = ()
+
+
+def parameters(values: Values) -> AttitudeEkf:
+    """Parameters from checked values (`attitude_options.PARAMETERS` and what goes with them)."""
+    return AttitudeEkf(*attitude_options.parameters(values))
+
+
+def initial_state(p: AttitudeParameters) -> AttitudeState:
+    """State before the first cycle."""
+    return attitude_solution.initial_state(p)
+
+
+def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
+    """Arrays before the first cycle."""
+    return attitude_solution.initial_memory(p)
 
 
 @kernel

@@ -2,6 +2,8 @@
 """Attitude and gyro bias from cells, magnetometer and gyro."""
 
 from collections.abc import Iterable
+from types import ModuleType
+from typing import ClassVar
 
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.declared import merged
@@ -9,7 +11,7 @@ from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sensor_inputs import field_input, gyro_input
-from css_estimation.attitude import attitude_ekf, attitude_options, attitude_solution, flight_references
+from css_estimation.attitude import attitude_ekf, attitude_options, flight_references
 from css_estimation.attitude.flight_references import FlightReferences
 from css_estimation.messages import attitude_estimate_fields, cells_input, field_reading, gyro_reading
 from css_msgs.msg import AttitudeEstimate
@@ -18,6 +20,7 @@ from css_msgs.msg import AttitudeEstimate
 class AttitudeFilter(Component):
     """Attitude and gyro bias by a multiplicative Kalman filter; the Sun as a vector or as voltages (DiGregorio)."""
 
+    algorithm: ClassVar[ModuleType] = attitude_ekf
     shared = ("cells", "orbit", "magnetometer")
     parameters = merged(attitude_options.PARAMETERS, flight_references.PARAMETERS)
 
@@ -34,21 +37,25 @@ class AttitudeFilter(Component):
         return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("cells.normals", "orbit.source")
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         if values.calibration.mode != "off" and values.sun_model == "vector":
             yield f"calibration.mode: {values.calibration.mode} given, but sun_model vector calibrates no cells"
 
     def configure(self) -> None:
-        self._parameters = attitude_options.parameters(self.values)
-        self._state = attitude_solution.initial_state(self._parameters)
-        self._memory = attitude_solution.initial_memory(self._parameters)
-        self._step = typed_call(attitude_ekf.step)
+        self._parameters = self.algorithm.parameters(self.values)
+        self._state = self.algorithm.initial_state(self._parameters)
+        self._memory = self.algorithm.initial_memory(self._parameters)
+        self._step = typed_call(self.algorithm.step)
         self._references = FlightReferences(self.values)
         self._last_stamp_ns: int | None = None
 
     def tune(self, values: Values) -> None:
         super().tune(values)
-        self._parameters = attitude_options.parameters(values)
+        self._parameters = self.algorithm.parameters(values)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns

@@ -63,6 +63,10 @@ class Triad(Component):
         return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("orbit.source",)
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         sampling = values.mission.period * values.magnetometer.divider
         if sampling > 0.05:

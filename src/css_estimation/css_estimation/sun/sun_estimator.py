@@ -47,6 +47,10 @@ class SunEstimator(Component):
         return (Output("estimate", f"{name}/sun_estimate", SunEstimate, ends_cycle=True),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("cells.normals",) if values[SOURCE] == "sensors" else ("cells.normals", "orbit.source")
+
+    @classmethod
     def smoothing(cls, values: Values) -> Smoothing:
         # in plain Python: loading the compiled one takes a second that a check before the flight need not wait for
         heading_gain = getattr(cls.algorithm, "heading_gain", None)

@@ -24,7 +24,7 @@ from css_common import places
 from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import MissionError
-from css_monte_carlo.mission_flight import refuse_uncovered
+from css_monte_carlo.mission_parts import measured_estimators
 from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
@@ -35,6 +35,7 @@ _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
     "okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2",
     "okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786",
+    "cubesat_vmm --cases 200 --guess 20",
 )
 _NOTES = """\
 Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
@@ -52,7 +53,13 @@ def _parser() -> CommandParser:
     )
     add("--cases", type=int, default=100, metavar="N", help="cases per configuration (default: %(default)s)")
     add("--first-case", type=int, default=0, metavar="K", help="number of the first case (default: 0)")
-    add("--estimators", nargs="+", metavar="NAME", help="Sun estimators to fly (default: the mission's)")
+    add(
+        "--estimators",
+        nargs="+",
+        metavar="NAME",
+        help="Sun estimators, or attitude filters of the graph, each in flights of its own (default: the one that "
+        "controls, or all if none does)",
+    )
     add("--gyro", nargs="+", choices=("on", "off"), default=["on"], help="fly with the gyro, without, or both")
     add("--duration", type=float, metavar="S", help="simulated time of a flight [s] (default: the mission's)")
     add("--seed", type=int, metavar="N", help="key of all random streams (default: the mission's)")
@@ -65,6 +72,13 @@ def _parser() -> CommandParser:
         help="fly every value of a parameter; several sweeps combine",
     )
     add("--sample", type=float, default=1.0, metavar="S", help="time between percentiles [s] (default: %(default)s)")
+    add(
+        "--guess",
+        type=float,
+        default=0.0,
+        metavar="DEG",
+        help="attitude filters begin with an error of so much about each axis, 1 sigma [deg] (default: as they say)",
+    )
     add("--out", type=Path, metavar="DIR", help="folder of the study (default: studies/MISSION_TIME)")
     add("--threads", type=int, metavar="N", help="flights at a time (default: one per processor)")
     add("--scheduler", metavar="ADDRESS", help="dask scheduler to run on; local starts one on this machine")
@@ -90,7 +104,6 @@ def _run(options: argparse.Namespace) -> int:
     if options.seed is not None:
         overrides.append(f"mission.seed={options.seed}")
     mission = load_mission(options.mission, overrides)
-    refuse_uncovered(mission)
     configurations = _configurations(mission, options)
     for remark in mission.remarks:
         print(f"monte-carlo: {remark}", file=sys.stderr)
@@ -106,6 +119,7 @@ def _run(options: argparse.Namespace) -> int:
             folder,
             first_case=options.first_case,
             sample_s=options.sample,
+            guess_deg=options.guess,
             threads=options.threads,
             progress=lambda done, total: bar.tell(part, done, total),
             scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
@@ -130,6 +144,8 @@ def _refuse_bad_numbers(options: argparse.Namespace) -> None:
         raise StudyError(f"--cases: {options.cases} from case {options.first_case} on, expected cases below 2**32")
     if not 0.0 < options.sample < 1e9:
         raise StudyError(f"--sample: {options.sample:g} given, expected seconds above 0")
+    if not 0.0 <= options.guess <= 180.0:
+        raise StudyError(f"--guess: {options.guess:g} given, expected 0 to 180 [deg]")
 
 
 def _configurations(mission: Mission, options: argparse.Namespace) -> list[Configuration]:
@@ -141,7 +157,8 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
         if not points:
             raise StudyError(f"--sweep {sweep}: expected KEY=V1,V2,...")
         axes.append([f"{key.strip()}={value}" for value in points])
-    estimators = options.estimators or [mission.values.graph.estimator]
+    measured = measured_estimators(mission)
+    estimators = options.estimators or measured
     return [
         Configuration(estimator, gyro == "on", point)
         for point in itertools.product(*axes)
@@ -155,8 +172,10 @@ def _default_folder(mission: str) -> Path:
 
 
 def print_study(study: Study, result: dict, console: Console) -> None:
-    """One table of all configurations, the values of a sweep below each other, and where the files are."""
-    console.print(_study_table(result["configurations"], summaries_of(study)))
+    """A table of the configurations of each kind, the values of a sweep below each other, and where the files are."""
+    rows = result["configurations"]
+    for columns in dict.fromkeys(summaries_of(study, row["estimator"]) for row in rows):
+        console.print(_study_table([row for row in rows if summaries_of(study, row["estimator"]) == columns], columns))
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "

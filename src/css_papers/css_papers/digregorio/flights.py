@@ -8,8 +8,9 @@ import numpy as np
 
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission
-from css_monte_carlo.attitude_flight import AttitudeFlight, fly_in_threads
 from css_monte_carlo.attitude_tallies import SAMPLED, AttitudeTallies
+from css_monte_carlo.chunk import fly_in_threads
+from css_monte_carlo.mission_flight import MissionFlight
 
 MISSION = "cubesat_vmm"
 VECTOR, VOLTAGE = "attitude_vector", "attitude_voltage"
@@ -48,7 +49,7 @@ class Flown(NamedTuple):
     """All cases of both filters with one set of diodes."""
 
     merits: dict[str, Merit]
-    samples: dict[str, np.ndarray]  # filter to (C, quantities, S), see `attitude_figures.SAMPLED`
+    samples: dict[str, np.ndarray]  # filter to (C, quantities, S), see `attitude_tallies.SAMPLED`
     sample_s: float
 
 
@@ -65,21 +66,21 @@ def fly(
     progress: Callable[[int, int], None] | None = None,
 ) -> Flown:
     """Flies both filters on the same data, from the same guess."""
-    flight = AttitudeFlight(mission.with_overrides([DIODES[diodes], *overrides]))
-    tallies = fly_in_threads(flight, cases, guess_deg=GUESS_DEG, progress=progress)
+    flown = mission.with_overrides([DIODES[diodes], *overrides])
     period_s = mission.period_ns * 1e-9
-    names = flight.filters
+    flights = [MissionFlight(flown, name) for name in FILTERS]
+    tallies = dict(zip(FILTERS, fly_in_threads(flights, cases, guess_deg=GUESS_DEG, progress=progress), strict=True))
     return Flown(
-        {name: _merit(tallies, f, period_s, windows_of(mission).settled_time) for f, name in enumerate(names)},
-        {name: tallies.samples[f] for f, name in enumerate(names)},
-        period_s * tallies.sample_every,
+        {name: _merit(of_filter, period_s, windows_of(mission).settled_time) for name, of_filter in tallies.items()},
+        {name: of_filter.samples for name, of_filter in tallies.items()},
+        period_s,
     )
 
 
-def _merit(tallies: AttitudeTallies, f: int, period_s: float, settled_s: float) -> Merit:
-    totals = tallies.totals[f]
+def _merit(tallies: AttitudeTallies, period_s: float, settled_s: float) -> Merit:
+    totals = tallies.totals
     settled = int(totals["settled"].sum())
-    errors = tallies.samples[f, :, ERROR]
+    errors = tallies.samples[:, ERROR]
     late = errors[:, int(settled_s / period_s) :]
     last = errors[:, -int(60.0 / period_s) :].mean(axis=1)
     return Merit(

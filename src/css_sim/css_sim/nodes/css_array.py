@@ -13,13 +13,14 @@ from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.vectors import Mat3, multiply, vector_of
-from css_environment.albedo import albedo_output, new_workspace
+from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS, earth_light_sources
 from css_environment.earth_light import new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, sun_cells
+from css_sim.sensing import CellsOfCase, sense_cells
 from css_sim.sensor_checks import LOUDEST_CELL, noise_findings
 
 
@@ -45,6 +46,10 @@ class CssArray(Component):
         return (Output("voltages", "css/voltages", CssVoltages),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("cells.normals",)
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
@@ -65,25 +70,24 @@ class CssArray(Component):
         values = self.values
         self._key = random_key(values.mission.seed, values.mission.case)
         self._p = sun_cells.parameters(values)
-        self._faults = cell_faults.case_faults(values, self._key)
         nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
-        self._cells = nominal.copy()
-        cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, self._cells)
+        cells = nominal.copy()
+        cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, cells)
+        faults = cell_faults.case_faults(values, self._key)
+        self._cells = CellsOfCase(cells, faults, np.zeros(len(cells)), new_workspace())
         grid = earth_reflectivity.source(values, self.epoch_ns)
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
         self._albedo_model = MODELS[values.albedo.model]
-        self._view, self._light, self._work = new_earth_view(), new_light(), new_workspace()
-        self._albedo = np.zeros(len(nominal))
+        self._view, self._light = new_earth_view(), new_light()
         self._segment_s = -1.0
         self._to_dcm, self._turn = typed_call(mrp_to_dcm), typed_call(multiply)
         self._advance_earth = typed_call(advance_dcm_en)
-        self._sources, self._output = typed_call(earth_light_sources), typed_call(albedo_output)
-        self._sample = typed_call(sun_cells.sample)
+        self._sources, self._sense = typed_call(earth_light_sources), typed_call(sense_cells)
         self._dcm_en = dcm_en_at(self.epoch_ns, 0.0)
 
     def tune(self, values: Values) -> None:
         super().tune(values)
-        self._faults = cell_faults.case_faults(values, self._key)
+        self._cells = self._cells._replace(faults=cell_faults.case_faults(values, self._key))
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
@@ -101,19 +105,17 @@ class CssArray(Component):
                 self._reflectivity,
                 self._light,
             )
-            self._output(
-                self._light, self._cells, self._p.screen, self._p.cos_half_view, dcm_bn, self._work, self._albedo
-            )
-        voltages = np.zeros(len(self._cells))
-        saturated = self._sample(
+        voltages = np.zeros(len(self._cells.cells))
+        saturated = self._sense(
             self._p,
             self._cells,
-            self._faults,
             self._key,
             self.step_of(stamp_ns),
+            dcm_bn,
             self._turn(dcm_bn, sun_n),
             truth.solar_flux * truth.illumination,
-            self._albedo,
+            self.values.albedo.enabled,
+            self._light,
             voltages,
         )
         return {"voltages": self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)}

@@ -65,6 +65,11 @@ class Dynamics(Plant):
         return tuple(outputs)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        wheels = ("wheels.axes",) if values.wheels.fitted else ()
+        return ("orbit.source", "spacecraft.inertia", *wheels)
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         yield from disturbances.conflicts(values)
         yield from initial_conditions.conflicts(values)

@@ -12,9 +12,9 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.vectors import multiply
 from css_msgs.msg import SpacecraftState
 from css_sim import magnetometer
+from css_sim.sensing import sense_field
 from css_sim.sensor_checks import LOUDEST_FIELD_NT, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -54,8 +54,7 @@ class Magnetometer(Component):
         truth = received["truth"]
         s1, s2, s3 = truth.sigma_bn.tolist()
         x, y, z = truth.field_n.tolist()
-        field_b = multiply(mrp_to_dcm((s1, s2, s3)), (x, y, z))
-        measured = magnetometer.measure(self._p, self._bias_b, self._key, step, field_b)
+        measured = sense_field(self._p, self._bias_b, self._key, step, mrp_to_dcm((s1, s2, s3)), (x, y, z))
         return self._field(stamp_ns, np.array(measured), self._covariance)
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:

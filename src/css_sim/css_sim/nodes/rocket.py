@@ -29,6 +29,10 @@ class Rocket(Plant):
         return (Output("truth", "truth", SpacecraftState, frame=INERTIAL),)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("orbit.source",)
+
+    @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         yield from orbit_findings(node.values)
         if node.values.geomagnetic_field:

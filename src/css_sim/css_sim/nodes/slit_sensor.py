@@ -42,6 +42,10 @@ class SlitSensor(Component):
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
         return (Output("step", "slits/step", SlitPulses), Output("pulse", "slits/pulse", SlitPulse, events=True))
 
+    @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("orbit.source",)
+
     def configure(self) -> None:
         values = self.values
         self._key = random_key(values.mission.seed, values.mission.case)

@@ -58,6 +58,10 @@ class MrpControl(Component):
         return tuple(outputs)
 
     @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("spacecraft.inertia", "wheels.axes") if values.wheels.fitted else ("spacecraft.inertia",)
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         return control.conflicts(values)
 

@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One compiled loop for every estimator, with control or without: types of parameters say what is called.
+
+A kernel that is handed to another as an argument cannot be cached on disk. The parameters of an estimator are a
+NamedTuple defined in its own module, so their type names the module whose `step` belongs to them, and the compiler
+settles the call when it compiles the loop for that type. None in the place of parameters is a part that a flight does
+not have: nothing is compiled for it. Running sums name their module in the same way.
+"""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+from numba.core import types
+from numba.extending import overload
+
+from css_monte_carlo.surroundings import references_at
+
+
+def estimate_heading(p, state, dt, voltages, aiding, eclipse_predicted):
+    """State and `SunHeading` after one cycle of a Sun estimator; arguments in `css_estimation.sun.sun_algorithm`."""
+    return _heading_step(_home(p))(p, state, dt, voltages, aiding, eclipse_predicted)
+
+
+def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
+    """State and `AttitudeSolution` after one cycle of an attitude filter.
+
+    Args:
+        p, state, memory, dt, voltages: as of `css_estimation.attitude.attitude_ekf.step`.
+        aiding: `Aiding`, with the field if it was measured in this cycle.
+        around: `Surroundings`, with what the filter's own models say.
+        k: row of the cycle in them.
+    """
+    return _attitude_step(_home(p))(p, state, memory, dt, voltages, aiding, around, k)
+
+
+def command(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out):
+    """State after one cycle of a control law; without control, torques and dipoles stay as they are.
+
+    Args:
+        heading: `SunHeading`.
+        p, speeds, field_b, field_valid, torque_out, dipole_out: as of `sun_pointing_control.step`.
+    """
+    return _control_step(_home(p))(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out)
+
+
+def tally(tallies, c, step, marks, truth, heading, attitude, memory):
+    """Counts one step of case `c`; arguments as of `tally_step` in the module of the sums."""
+    _tally_step(_home(tallies))(tallies, c, step, marks, truth, heading, attitude, memory)
+
+
+def note_estimate(tallies, heading, attitude, out):
+    """Writes what a trace keeps of the measured estimate, as `ESTIMATE_COLUMNS` of the module of the sums says."""
+    _note(_home(tallies))(tallies, heading, attitude, out)
+
+
+def _home(p: Any) -> ModuleType | None:
+    """The module that defines the type of a value, or of a numba type; None for None."""
+    if p is None or isinstance(p, types.NoneType):
+        return None
+    return sys.modules[getattr(p, "instance_class", type(p)).__module__]
+
+
+@overload(estimate_heading, jit_options={"forceinline": True})
+def _overload_heading(p, state, dt, voltages, aiding, eclipse_predicted):
+    return _heading_step(_home(p))
+
+
+def _heading_step(home):
+    if home is None:
+        return lambda p, state, dt, voltages, aiding, eclipse_predicted: (None, None)
+    step = home.step
+
+    def call(p, state, dt, voltages, aiding, eclipse_predicted):
+        return step(p, state, dt, voltages, aiding, eclipse_predicted)
+
+    return call
+
+
+@overload(estimate_attitude, jit_options={"forceinline": True})
+def _overload_attitude(p, state, memory, dt, voltages, aiding, around, k):
+    return _attitude_step(_home(p))
+
+
+def _attitude_step(home):
+    if home is None:
+        return lambda p, state, memory, dt, voltages, aiding, around, k: (None, None)
+    step = home.step
+
+    def call(p, state, memory, dt, voltages, aiding, around, k):
+        light = around.predicted_light[min(k, around.predicted_light.shape[0] - 1)]
+        return step(
+            p,
+            state,
+            memory,
+            dt,
+            voltages,
+            aiding.gyro_b,
+            aiding.gyro_valid,
+            aiding.field_b,
+            aiding.field_valid,
+            references_at(around.references, k),
+            light,
+        )
+
+    return call
+
+
+@overload(command, jit_options={"forceinline": True})
+def _overload_command(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out):
+    return _control_step(_home(p))
+
+
+def _control_step(home):
+    if home is None:
+        return lambda p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out: None
+    step = home.step
+
+    def call(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out):
+        after, _ = step(
+            p,
+            state,
+            dt,
+            heading.sun_b,
+            heading.validity,
+            heading.eclipse,
+            heading.omega_bn_b,
+            heading.rate_source,
+            speeds,
+            field_b,
+            field_valid,
+            torque_out,
+            dipole_out,
+        )
+        return after
+
+    return call
+
+
+@overload(tally, jit_options={"forceinline": True})
+def _overload_tally(tallies, c, step, marks, truth, heading, attitude, memory):
+    return _tally_step(_home(tallies))
+
+
+def _tally_step(home):
+    tally_step = home.tally_step
+
+    def call(tallies, c, step, marks, truth, heading, attitude, memory):
+        tally_step(tallies, c, step, marks, truth, heading, attitude, memory)
+
+    return call
+
+
+@overload(note_estimate, jit_options={"forceinline": True})
+def _overload_note(tallies, heading, attitude, out):
+    return _note(_home(tallies))
+
+
+def _note(home):
+    note = home.note_estimate
+
+    def call(tallies, heading, attitude, out):
+        note(heading, attitude, out)
+
+    return call

@@ -1,0 +1,130 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The running sums of the loop, from the log of a flight that was not flown in it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from css_analysis.estimate_errors import true_attitudes
+from css_analysis.flight_log import FlightLog
+from css_analysis.flight_metrics import windows_of
+from css_common.attitude import quaternion_to_mrp
+from css_common.kernel import typed_call
+from css_common.vectors import Vec3
+from css_estimation.attitude import attitude_solution
+from css_estimation.attitude.attitude_solution import AttitudeSolution
+from css_estimation.sun import sun_heading
+from css_estimation.sun.sun_heading import Covariance, SunHeading
+from css_monte_carlo import attitude_tallies, case_tallies
+from css_monte_carlo.attitude_tallies import AttitudeTallies
+from css_monte_carlo.case_tallies import Tallies, step_marks
+from css_monte_carlo.step_truth import Truth
+
+_ZERO: Vec3 = (0.0, 0.0, 0.0)
+_NO_HEADING = SunHeading(
+    _ZERO, sun_heading.NO_COVARIANCE, _ZERO, 0.0, 0.0, 0, 0, sun_heading.VALIDITY_NONE, sun_heading.RATE_NONE, 0, 0
+)
+_NO_ATTITUDE = AttitudeSolution(_ZERO, _ZERO, _ZERO, 0.0, 0.0, 0, 0, attitude_solution.VALIDITY_NONE, 0, 0)
+
+
+class ReportedCovariance(NamedTuple):
+    """What a filter tells of its memory."""
+
+    covariance: np.ndarray  # (6, 6) of attitude and bias
+
+
+def tally_headings(tallies: Tallies, c: int, log: FlightLog, name: str, wheels: np.ndarray) -> None:
+    """Counts the flight of case `c`, as the loop counts its steps.
+
+    Args:
+        name: of the Sun estimator.
+        wheels: (N,) of `rigid_body.WHEEL`, of the case.
+    """
+    estimates = log.estimates.get(name)
+    rows = _rows_by_step(log, None if estimates is None else log.truth_rows(estimates))
+    momentum_b = _wheel_momentum(log, wheels)
+    marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
+    count = typed_call(case_tallies.tally_step)
+    for step, row in enumerate(rows):
+        heading = _NO_HEADING if estimates is None or row < 0 else _heading(estimates, row)
+        truth = _truth(log, step, log.having("truth").sigma_bn[step], momentum_b[step], np.zeros(3))
+        count(tallies, c, step, int(marks[step]), truth, heading, None, None)
+
+
+def tally_attitudes(tallies: AttitudeTallies, c: int, log: FlightLog, name: str, gyro_bias_b: np.ndarray) -> None:
+    """Counts the flight of case `c`, as the loop counts its steps; an attitude is compared with that of its instant.
+
+    Args:
+        name: of the attitude filter.
+        gyro_bias_b: (K, 3) true bias at every step [rad/s]; NaN: there is none.
+    """
+    attitudes = log.attitudes.get(name)
+    sigma_bn = log.having("truth").sigma_bn.copy()
+    pairs = None if attitudes is None else log.truth_rows(attitudes)
+    if attitudes is not None and pairs is not None:
+        sigma_bn[pairs[1]] = true_attitudes(log, pairs[1], attitudes.delay[pairs[0]])
+    marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
+    count = typed_call(attitude_tallies.tally_step)
+    memory = ReportedCovariance(np.zeros((6, 6)))
+    for step, row in enumerate(_rows_by_step(log, pairs)):
+        solution = _NO_ATTITUDE
+        if attitudes is not None and row >= 0:
+            solution = _solution(attitudes, row)
+            memory.covariance[:] = attitudes.covariance[row].reshape(6, 6)
+        truth = _truth(log, step, sigma_bn[step], np.zeros(3), gyro_bias_b[step])
+        count(tallies, c, step, int(marks[step]), truth, None, solution, memory)
+
+
+def _rows_by_step(log: FlightLog, pairs: tuple[np.ndarray, np.ndarray] | None) -> list[int]:
+    """Row of the estimate at each step of the truth, -1 for none."""
+    rows = np.full(len(log.having("truth")), -1)
+    if pairs is not None:
+        rows[pairs[1]] = pairs[0]
+    return rows.tolist()
+
+
+def _wheel_momentum(log: FlightLog, wheels: np.ndarray) -> np.ndarray:
+    """(K, 3) momentum of all wheels in b [N m s]."""
+    truth = log.having("truth")
+    if log.wheels is None or len(wheels) == 0:
+        return np.zeros((len(truth), 3))
+    axes = np.stack([wheels["gx"], wheels["gy"], wheels["gz"]], axis=1)
+    return (wheels["inertia"] * (log.wheels.speed + truth.omega_bn_b @ axes.T)) @ axes
+
+
+def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b) -> Truth:
+    omega_bn_b = log.having("truth").omega_bn_b[step]
+    vectors = (sigma_bn, omega_bn_b, log.sun_b[step], log.array_normal_b, momentum_b, gyro_bias_b)
+    return Truth(*map(_vec3, vectors))
+
+
+def _heading(estimates, row: int) -> SunHeading:
+    e = estimates
+    covariance: Covariance = tuple(e.covariance[row].tolist())
+    numbers = (e.nis_dof, e.lit_mask, e.validity, e.rate_source, e.eclipse, e.mode)
+    return SunHeading(
+        _vec3(e.sun_b[row]),
+        covariance,
+        _vec3(e.omega_bn_b[row]),
+        float(e.age[row]),
+        float(e.nis[row]),
+        *(int(column[row]) for column in numbers),
+    )
+
+
+def _solution(attitudes, row: int) -> AttitudeSolution:
+    a = attitudes
+    numbers = (a.nis_dof, a.lit_mask, a.validity, a.used, a.mode)
+    return AttitudeSolution(
+        _vec3(quaternion_to_mrp(tuple(a.q_bn[row].tolist()))) if a.validity[row] else _ZERO,
+        _vec3(a.omega_bn_b[row]),
+        _vec3(a.gyro_bias_b[row]),
+        float(a.age[row]),
+        float(a.nis[row]),
+        *(int(column[row]) for column in numbers),
+    )
+
+
+def _vec3(values) -> Vec3:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)

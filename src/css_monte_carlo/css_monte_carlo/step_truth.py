@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What is true of a spacecraft at one step, for the running sums to measure estimates against."""
+
+from typing import NamedTuple
+
+from css_common.vectors import Vec3
+
+
+class Truth(NamedTuple):
+    """One step of one case."""
+
+    sigma_bn: Vec3
+    omega_bn_b: Vec3  # [rad/s]
+    sun_b: Vec3
+    array_normal_b: Vec3
+    wheel_momentum_b: Vec3  # [N m s] of all wheels
+    gyro_bias_b: Vec3  # [rad/s]
