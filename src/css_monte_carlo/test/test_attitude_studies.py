@@ -99,6 +99,7 @@ def test_cluster_gives_the_same_bytes(whole, tmp_path, monkeypatch):
 
 BESIDE = """/**:
   ros__parameters:
+    extends: okeefe_2013
     mission: {name: beside, duration: 330.0, period: 1.0}
     measures: {settled_time: 300.0}
     graph:
