@@ -91,7 +91,7 @@ def test_recording_by_reception_time_gives_the_bytes_that_flew(tmp_path, capsys)
         connections = {t.name: out.add_connection(t.name, t.type, typestore=store) for t in topics}
         for log_time, message in heard:
             out.write(connections[message.topic], log_time, message.data)
-    code, result, _ = replay(tmp_path / "heard", capsys, "--estimators", "ekf")
+    code, result, _ = replay(tmp_path / "heard", capsys, "--mission", "okeefe_2013", "--estimators", "ekf")
     assert code == 0
     assert result["replayed"][0]["comparison"] | {"largest_difference": 0.0} == {
         "compared": ESTIMATES,

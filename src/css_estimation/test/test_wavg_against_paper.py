@@ -190,7 +190,7 @@ def test_normals_that_cancel_leave_no_direction():
     assert wavg.weighted_average(p.layout, p.gate, voltages, 0) == ((0.0, 0.0, 0.0), 0, MODE_NO_SUN)
 
 
-def test_layout_of_the_default_mission_is_the_dual_pyramid():
+def test_layout_of_the_mission_is_the_dual_pyramid():
     layout = cell_layout(okeefe_values(CELLS))
     np.testing.assert_allclose(np.abs(layout.cells["nz"]), math.sqrt(0.5), rtol=1e-12)
     assert layout.cos_half_view == pytest.approx(0.5)
