@@ -2,6 +2,7 @@
 """Names in the figures of a spinning payload can be read."""
 
 from itertools import combinations
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -37,3 +38,15 @@ def test_names_of_events_neither_overlap_nor_cover_the_data(axes):
     assert all(frame.x0 <= box.x0 and box.x1 <= frame.x1 and box.y1 <= frame.y1 for box in boxes.values())
     highest = above.transData.transform((0.0, above.lines[0].get_ydata().max()))[1]
     assert all(box.y0 >= highest for box in boxes.values())
+
+
+def test_the_line_of_a_microsecond_is_where_it_says(tmp_path, monkeypatch):
+    figures = []
+    monkeypatch.setattr(spin_figures, "save", lambda figure, path: figures.append(figure) or path)
+    candidates = [SimpleNamespace(frequency=1.6), SimpleNamespace(frequency=3.8)]
+    studies = {"one head": SimpleNamespace(candidates=candidates, residuals=(2e-4, 3e-7))}
+    spin_figures.write_alias_figure(studies, 5.45, tmp_path / "aliases.png")
+    (axes,) = figures[0].axes
+    points, line = axes.lines
+    np.testing.assert_allclose(points.get_ydata(), [200.0, 0.3])
+    assert set(line.get_ydata()) == {1.0} and "1 us" in [text.get_text() for text in axes.texts]
