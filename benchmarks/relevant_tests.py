@@ -8,6 +8,8 @@ from pathlib import Path
 
 # This module imports what missions name: whoever loads a mission may run any node.
 _LOADER = "css_common.node_files"
+# Whoever knows the verbs starts their executables.
+_VERBS = "bootstrap.verbs"
 
 
 class Sources:
@@ -57,6 +59,8 @@ class Sources:
         found += [self.helpers[name] for name in sorted(names) if name in self.helpers]
         if self.modules.get(_LOADER) == file:
             found += [source for name, source in self.modules.items() if ".nodes." in name]
+        if _VERBS in names:
+            found += [source for name, source in self.modules.items() if ".commands." in name]
         return tuple(found)
 
 

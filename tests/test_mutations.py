@@ -84,3 +84,6 @@ def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sou
     # a node file is imported by what loads missions
     _, others = sources.seen_by(ROOT / "src/css_estimation/css_estimation/nodes/coning.py", 50)
     assert ROOT / "tests/test_components.py" in others
+    # a command by what starts its verb
+    _, others = sources.seen_by(ROOT / "src/css_bringup/css_bringup/commands/demo.py", 3)
+    assert ROOT / "tests/test_verbs.py" in others

@@ -18,8 +18,8 @@ from css_common.node_process import run_node
 from css_common.preflight import preflight
 from css_monte_carlo.commands import monte_carlo
 from css_monte_carlo.direct_flight import fly_directly
+from css_monte_carlo.errors import StudyError
 from css_monte_carlo.study import Configuration, run_study
-from css_monte_carlo.study_folder import StudyError
 from css_papers.okeefe.configurations import AS_PRINTED, IMPROVED
 from css_sim.flight_checks import FASTEST, MotionError, check_rate
 from css_sim.nodes.dynamics import Dynamics

@@ -12,8 +12,8 @@ from css_analysis.flight_summary import criteria_failures, criteria_verdicts, su
 from css_analysis.quantities import QUANTITIES, summaries
 from css_analysis.readable_table import ReadableTable
 from css_common.mission import load_mission
-from css_monte_carlo.commands.monte_carlo import _study_table
 from css_monte_carlo.verbs.coverage import _print_tables, study
+from css_monte_carlo.verbs.monte_carlo import _study_table
 
 WIDTHS = (12, 20, 40, 60, 80, 120)
 

@@ -15,12 +15,12 @@ import pyarrow as pa
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
 from css_monte_carlo.case_table import case_table
+from css_monte_carlo.errors import StudyError
 from css_monte_carlo.loop import fly_block
 from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.stepped_flight import SteppedFlight
-from css_monte_carlo.study_folder import StudyError
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_sim.flight_checks import MotionError, check_rate
 

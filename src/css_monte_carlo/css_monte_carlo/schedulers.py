@@ -8,7 +8,8 @@ from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from typing import Any, NamedTuple, Self
 
 from css_monte_carlo.chunk import ChunkTask, flown_task
-from css_monte_carlo.study_folder import StudyError, parquet_bytes
+from css_monte_carlo.errors import StudyError
+from css_monte_carlo.study_folder import parquet_bytes
 
 
 class ChunkResult(NamedTuple):

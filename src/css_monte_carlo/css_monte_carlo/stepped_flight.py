@@ -13,10 +13,10 @@ from css_common.mission import Mission, MissionError
 from css_common.random_streams import RandomKey, random_key
 from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.direct_flight import fly_checked
+from css_monte_carlo.errors import StudyError
 from css_monte_carlo.log_tallies import tally_attitudes, tally_headings
 from css_monte_carlo.measures import ATTITUDE, HEADING, CaseTallies
 from css_monte_carlo.mission_parts import is_attitude, is_heading
-from css_monte_carlo.study_folder import StudyError
 from css_sim import gyro, initial_conditions
 from css_sim.flight_checks import MotionError
 from css_sim.nodes.dynamics import Dynamics

@@ -16,11 +16,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from css_monte_carlo.errors import StudyError
+
 MANIFEST, CASES, PERCENTILES, CHUNKS = "study.json", "cases.parquet", "percentiles.parquet", "chunks"
-
-
-class StudyError(Exception):
-    """A study that cannot be made, resumed or read; the message says why in one line."""
 
 
 class StudyFolder:

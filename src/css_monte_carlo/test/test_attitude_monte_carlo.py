@@ -37,6 +37,7 @@ EVENTS = """
 LIT = ("css_array.albedo.enabled=true", "attitude_voltage.albedo.compensate=true")
 BESIDE = """/**:
   ros__parameters:
+    extends: okeefe_2013
     mission: {name: beside, duration: 400.0, period: 1.0}
     measures: {settled_time: 300.0}
     graph:
@@ -64,7 +65,13 @@ VARIANTS = {
         mission().text().replace("ros__parameters:", "ros__parameters:" + EVENTS, 1), "scripted"
     ),
     "rods and wheels that nobody commands": lambda: mission(
-        "rods.fitted=true", "wheels.fitted=true", "dynamics.initial.wheel_speed_rpm=50"
+        "rods.fitted=true",
+        "wheels.fitted=true",
+        "wheels.axes=1,0,0,0,1,0,0,0,1",
+        "wheels.inertia=1e-5",
+        "wheels.max_torque=1e-4",
+        "wheels.max_speed_rpm=6000",
+        "dynamics.initial.wheel_speed_rpm=50",
     ),
     "no gyro": lambda: mission_from_text(BESIDE.replace("css_sim/gyro, ", ""), "no gyro"),
     "beside a Sun estimator that controls": lambda: mission_from_text(BESIDE, "beside"),

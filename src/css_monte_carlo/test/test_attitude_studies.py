@@ -9,9 +9,9 @@ from css_analysis.quantities import attitude_quantities, study_quantities
 from css_common.mission import load_mission, mission_from_text
 from css_monte_carlo import study
 from css_monte_carlo.attitude_tallies import SAMPLED
+from css_monte_carlo.errors import StudyError
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, read_study, run_study
-from css_monte_carlo.study_folder import StudyError
 from css_monte_carlo.study_summary import configuration_objects, rows_of
 
 EVENTS = "events: {off: {time: 310.0, node: gyro, action: deactivate}}"

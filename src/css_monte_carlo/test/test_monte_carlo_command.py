@@ -96,7 +96,7 @@ NOTHING_TO_FLY = {
 @pytest.mark.parametrize("reason", NOTHING_TO_FLY)
 def test_mission_without_a_plant_or_an_estimator_is_said_before_anything_starts(reason, tmp_path, capsys):
     file = tmp_path / "lacking.yaml"
-    file.write_text(f"/**: {{ros__parameters: {{graph: {{nodes: [{NOTHING_TO_FLY[reason]}]}}}}}}")
+    file.write_text(f"/**: {{ros__parameters: {{extends: cubesat_vmm, graph: {{nodes: [{NOTHING_TO_FLY[reason]}]}}}}}}")
     for arguments in ([], ["--estimators", "ekf"], ["--gyro", "off"]):
         assert main([str(file), "--out", str(tmp_path / "s"), *arguments]) == 2
         err = capsys.readouterr().err

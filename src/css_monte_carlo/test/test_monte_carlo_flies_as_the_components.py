@@ -140,7 +140,8 @@ def test_the_same_over_several_blocks_and_scripted_changes():
 
 REFUSED = {
     "another event": (
-        "/**: {ros__parameters: {events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
+        "/**: {ros__parameters: {extends: okeefe_2013, "
+        "events: {a: {time: 1.0, node: mrp_control, action: deactivate}}}}",
         "scripted: events.a: the compiled loop switches sensors alone, here gyro",
     ),
     "two gyros": (

@@ -13,9 +13,9 @@ import pytest
 from css_common.mission import load_mission
 from css_monte_carlo import study
 from css_monte_carlo.chunk import ChunkTask
+from css_monte_carlo.errors import StudyError
 from css_monte_carlo.schedulers import ChunkResult, DaskScheduler, Scheduler, ThreadScheduler, run_task
 from css_monte_carlo.study import Configuration, read_study, run_study
-from css_monte_carlo.study_folder import StudyError
 from css_monte_carlo.study_summary import rows_of, study_object
 
 # A coarse cycle keeps flights short; what is tested here does not depend on it.

@@ -65,9 +65,8 @@ def test_a_rocket_that_sees_the_sun_through_slits_is_a_study(tmp_path):
 
 
 def test_an_event_that_the_loop_has_no_place_for_is_flown(tmp_path):
-    shared = "extends: okeefe_2013, mission: {{duration: 60.0, period: 1.0}}"
-    text = "/**: {{ros__parameters: {{" + shared + ", events: {{{}}}}}}}"
-    event = "held: {time: 20.0, node: mrp_control, action: deactivate}"
+    text = "/**: {{ros__parameters: {{extends: okeefe_2013, mission: {{duration: 60.0, period: 1.0}}{}}}}}"
+    event = ", events: {held: {time: 20.0, node: mrp_control, action: deactivate}}"
     held, free = (
         run_study(mission_from_text(text.format(events), name), [Configuration("ekf", True)], 1, tmp_path / name)
         for name, events in (("held", event), ("free", ""))

@@ -16,11 +16,9 @@ from typing import NamedTuple
 
 from css_common.schema import unknown_name
 from css_monte_carlo.study import Progress
+from css_papers.errors import ReproductionError
+from css_papers.paper_names import paper_names
 from css_papers.rows import Row
-
-
-class ReproductionError(Exception):
-    """What was asked for cannot be done; the message is one line for the user."""
 
 
 class Request(NamedTuple):
@@ -38,11 +36,6 @@ class Paper(NamedTuple):
     name: str
     title: str
     reproduce: Callable[[Request], Sequence[Row]]
-
-
-def paper_names() -> list[str]:
-    """Names of the papers, in the order of the alphabet."""
-    return sorted(file.parent.name for file in Path(__file__).parent.glob("*/paper.py"))
 
 
 def find_paper(name: str) -> Paper:

@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from css_papers.errors import ReproductionError
 from css_papers.page import Link, Listing, Page, Picture, Section, Table, write_page
-from css_papers.papers import ReproductionError, find_paper, paper_names
+from css_papers.paper_names import paper_names
+from css_papers.papers import find_paper
 from css_papers.rows import MISSES, Must, notes_of, number, row, row_object, table_of
 
 ROWS = [
