@@ -55,7 +55,7 @@ Quick start (the first command sets everything up inside this folder, once):
 Usage: ./sunpoint VERB [ARGUMENTS]
 {table}
 
-Missions are files in config/ or anywhere; one may say `extends: OTHER` and only in what it differs (README.md).
+Missions are files in config/ or anywhere; one may extend another (`extends: OTHER`, see README.md).
 
 A flight has a ROS domain for itself. shell, record and play join it; when several are running,
 --flight NAME|PID or --domain N chooses.
