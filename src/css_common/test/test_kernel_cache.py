@@ -55,8 +55,9 @@ class Project:
         """Calls the outer kernel in a fresh process: result, cache hits and cache folder."""
         ours = ("NUMBA_", "SUNPOINT_", "PYTHON", "XDG_")
         env = {key: value for key, value in os.environ.items() if not key.startswith(ours)}
-        # Python's own bytecode cache would miss an edit that keeps the file's size and second
+        # Python's own bytecode cache would miss an edit that keeps the file's size and second; that of numba is read
         env |= {"PYTHONPATH": str(self.root), "PYTHONDONTWRITEBYTECODE": "1", "SUNPOINT_HOME": str(self.home)}
+        env |= {key: os.environ[key] for key in ("PYTHONPYCACHEPREFIX",) if key in os.environ}
         env |= environment
         done = subprocess.run(
             [sys.executable, "-c", PROGRAM.format(before=before)], env=env, capture_output=True, text=True, check=False
