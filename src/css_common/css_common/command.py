@@ -7,7 +7,8 @@ import math
 import os
 import signal
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Never
 
 DONE = 0
@@ -113,16 +114,21 @@ def guarded(
 def implementation(module: str) -> Callable[..., int]:
     """What a command does: `run` of a module that is loaded now, once options are read, for that takes a second.
 
-    Libraries take an exception in the middle of their import badly: until they are there Ctrl-C just ends.
-
     Args:
         module: full name.
     """
+    with plain_interrupts():
+        return importlib.import_module(module).run
+
+
+@contextmanager
+def plain_interrupts() -> Iterator[None]:
+    """Ctrl-C just ends: for imports, as libraries take an exception in the middle of theirs badly."""
     interrupt = signal.getsignal(signal.SIGINT)
     if interrupt is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
-        return importlib.import_module(module).run
+        yield
     finally:
         if interrupt is signal.default_int_handler:
             signal.signal(signal.SIGINT, interrupt)

@@ -8,12 +8,12 @@ line of a module cannot be guarded.
 import importlib
 import importlib.util
 import os
-import signal
 import sys
 from pathlib import Path
 from types import ModuleType
 
 from css_common import network, supervised
+from css_common.command import plain_interrupts
 
 _USAGE = 2
 _INTERRUPTED = 130
@@ -21,13 +21,9 @@ _INTERRUPTED = 130
 
 def main() -> int:
     """Runs `main` of PACKAGE/nodes/NAME.py or PACKAGE/commands/NAME.py, started as lib/PACKAGE/NAME; its exit code."""
-    interrupt = signal.getsignal(signal.SIGINT)
-    if interrupt is signal.default_int_handler:
-        # Libraries take an exception in the middle of their import badly: until they are there Ctrl-C just ends.
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-    supervised.take_on()
-    module = _module(Path(sys.argv[0]))
-    signal.signal(signal.SIGINT, interrupt)
+    with plain_interrupts():
+        supervised.take_on()
+        module = _module(Path(sys.argv[0]))
     if not _settle_network(module.__name__):
         return _USAGE
     try:

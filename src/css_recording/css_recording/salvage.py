@@ -113,11 +113,6 @@ def copy_messages(source: Path, storage: BagStorage, folder: Path, report: Recov
         raise _given_up(source, folder, error) from error
 
 
-def _defined(topic: Topic) -> Topic:
-    """The topic, with the installed definition where it was recorded without one."""
-    return topic if topic.schema and topic.schema.text else topic._replace(schema=None)
-
-
 def _create(source: Path, folder: Path, topics: Iterable[Topic], file_name: str | None = None) -> BagWriter:
     try:
         return BagWriter(folder, topics, file_name=file_name)

@@ -9,12 +9,7 @@ average and Kalman filter, each with gyro and without.
 import sys
 from pathlib import Path
 
-from css_bringup.options import (
-    add_domain_option,
-    add_mission_options,
-    add_output_options,
-    guarded,
-)
+from css_bringup.options import add_domain_option, add_mission_options, add_output_options, guarded
 from css_common.command import CommandParser, command_parser, implementation
 
 _EXAMPLES = ("", "okeefe_2013 --duration 600 --out bags/first", "okeefe_2013 --case 7 --figures figures")

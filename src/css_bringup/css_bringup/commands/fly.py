@@ -3,12 +3,7 @@
 
 import sys
 
-from css_bringup.options import (
-    add_domain_option,
-    add_mission_options,
-    add_output_options,
-    guarded,
-)
+from css_bringup.options import add_domain_option, add_mission_options, add_output_options, guarded
 from css_common.command import CommandParser, command_parser, implementation
 
 _EXAMPLES = (

@@ -8,11 +8,7 @@ from css_analysis.flight_log import read_flight
 from css_bringup.flight_result import default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
-from css_bringup.options import (
-    complain,
-    console,
-    errors,
-)
+from css_bringup.options import complain, console, errors
 from css_bringup.replay_bag import default_replay, replay
 from css_bringup.replay_pass import parse_request
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet

@@ -10,11 +10,7 @@ from css_analysis.spin_summary import spin_lines, spin_object
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
-from css_bringup.options import (
-    complain,
-    console,
-    errors,
-)
+from css_bringup.options import complain, console, errors
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission

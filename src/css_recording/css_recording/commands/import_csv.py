@@ -8,8 +8,7 @@ from pathlib import Path
 
 from css_common.command import FAILED, USAGE, CommandParser, command_parser, complain
 from css_common.epochs import parse_utc
-from css_recording import layout_file as cell_layout
-from css_recording import telemetry_table
+from css_recording import layout_file, telemetry_table
 from css_recording.bag_folder import fresh_folder
 from css_recording.csv_import import ImportReport, import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
@@ -25,7 +24,7 @@ Turn a CSV table of telemetry into a recording that replays like one of Sunpoint
 
 The layout file says which columns are cells:
 
-{cell_layout.__doc__}
+{layout_file.__doc__}
 """
 
 _NOTES = """\
