@@ -126,6 +126,8 @@ class Trial:
         doubtful: list[str] = []
         while True:
             outcome, by, used = self._run(files, seconds, doubtful)
+            if outcome == KILLED and not by:
+                self._insist_on_tests(mutant, files)
             if outcome != KILLED or not by or by in doubtful:
                 return outcome, by, used
             if self._passes_without(mutant, by) and self._run([by], seconds)[0] == KILLED:
@@ -139,6 +141,22 @@ class Trial:
             self._sound[test] = outcome == SURVIVED
             self._write(mutant.file, mutant.mutation.applied(mutant.source))
         return self._sound[test]
+
+    def _insist_on_tests(self, mutant: Mutant, files: list[Path]) -> None:
+        """A run that fails before its first test is a verdict only where the sources as they are get that far."""
+        self._write(mutant.file, mutant.source)
+        names = [str(file.relative_to(self._copy)) for file in files]
+        collected = subprocess.run(
+            [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "-p", "one_test", *names],
+            cwd=self._copy,
+            env=self._environment(self._copy / "progress.json"),
+            capture_output=True,
+            text=True,
+        )
+        if collected.returncode not in (0, 5):
+            said = (collected.stdout + collected.stderr).strip()
+            raise SystemExit(f"mutants: the tests do not start without a mutant either (after ./sunpoint test?):\n{said}")
+        self._write(mutant.file, mutant.mutation.applied(mutant.source))
 
     def _write(self, file: Path, source: bytes) -> None:
         place = self._copy / file

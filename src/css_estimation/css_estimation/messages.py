@@ -15,7 +15,7 @@ from css_common.vectors import Vec3, vector_of
 from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeSolution
 from css_estimation.sun.error_covariance import CALIBRATION
 from css_estimation.sun.sun_heading import SunHeading
-from css_msgs.msg import CssVoltages
+from css_msgs.msg import CssVoltages, WheelState
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _to_quaternion = typed_call(mrp_to_quaternion)
@@ -30,6 +30,18 @@ def cells_input(values: Values) -> Input:
         CssVoltages,
         lengths={"voltages": len(cells.normals)},
         readings={"voltages": Readings(cells.smallest_reading, cells.largest_reading)},
+    )
+
+
+def wheels_input(values: Values) -> Input:
+    """The measured speeds of the wheels, for a component that can do without."""
+    return Input(
+        "wheels",
+        "wheels/state",
+        WheelState,
+        required=False,
+        lengths={"speed": len(values.wheels.axes)},
+        used=("speed",),
     )
 
 

@@ -25,6 +25,7 @@ from css_estimation.sun.sun_heading import (
     PREDICTION_ECLIPSED,
     PREDICTION_SUNLIT,
     UNAIDED,
+    UNKNOWN_SKY,
     VALIDITY_HELD,
     VALIDITY_NONE,
     VALIDITY_VALID,
@@ -46,7 +47,8 @@ class Safe:
 
     def step(self, voltages, predicted=PREDICTION_SUNLIT, dt=DT):
         voltages = np.asarray(voltages, dtype=float)
-        self.state, heading = self.algorithm.step(self.p, self.state, dt, voltages, UNAIDED, predicted)
+        aiding = UNAIDED._replace(sky=UNKNOWN_SKY._replace(predicted=predicted))
+        self.state, heading = self.algorithm.step(self.p, self.state, None, dt, voltages, aiding)
         return heading
 
 

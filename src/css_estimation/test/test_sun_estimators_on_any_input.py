@@ -12,7 +12,7 @@ from listing import components, executable, settings_of
 from okeefe_spacecraft import okeefe_values
 
 from css_estimation.sun.sun_estimator import SunEstimator
-from css_estimation.sun.sun_heading import PREDICTION_SUNLIT, UNAIDED, VALIDITY_NONE, VALIDITY_VALID, Aiding
+from css_estimation.sun.sun_heading import PREDICTION_SUNLIT, UNAIDED, VALIDITY_NONE, VALIDITY_VALID
 
 KINDS = components(base=SunEstimator)
 TURNING = UNAIDED._replace(gyro_b=(0.0, 0.0, 0.01), gyro_valid=True)
@@ -61,7 +61,12 @@ BY_COUNT = pytest.mark.parametrize(
 
 def build(kind, count, **changes):
     p = kind.algorithm.parameters(okeefe_values(kind.table(), **(layouts(kind)[count] | changes)))
-    return p, kind.algorithm.initial_state(p)
+    return p, kind.algorithm.initial_state(p), kind.algorithm.initial_memory(p)
+
+
+def predicting(predicted, aiding=UNAIDED):
+    """What is known beside the cells, with what an orbit model says about the shadow."""
+    return aiding._replace(sky=aiding.sky._replace(predicted=predicted))
 
 
 def outputs_of(kind, count, sun_b):
@@ -91,11 +96,11 @@ fields = st.one_of(st.floats(-6e-5, 6e-5), st.floats(allow_nan=True, allow_infin
 cycle = st.tuples(
     st.lists(outputs, min_size=32, max_size=32),
     st.builds(
-        Aiding,
-        st.tuples(rates, rates, rates),
-        st.booleans(),
-        st.tuples(fields, fields, fields),
-        st.booleans(),
+        UNAIDED._replace,
+        gyro_b=st.tuples(rates, rates, rates),
+        gyro_valid=st.booleans(),
+        field_b=st.tuples(fields, fields, fields),
+        field_valid=st.booleans(),
     ),
     st.one_of(st.sampled_from([0.1, 0.0, 1e-9, 1.0, 3600.0]), st.floats(allow_nan=True, allow_infinity=True)),
     st.sampled_from([-1, 0, 1]),
@@ -108,9 +113,11 @@ cycle = st.tuples(
 def test_any_sequence(kind, options, cycles, data):
     count = data.draw(st.sampled_from(sorted(layouts(kind))), "cells")
     drawn = {"eclipse__source": "both", "rate__use_field": data.draw(st.booleans(), "use_field")}
-    p, state = build(kind, count, **(drawn | options))
+    p, state, memory = build(kind, count, **(drawn | options))
     for voltages, aiding, dt, predicted in cycles:
-        state, heading = kind.algorithm.step(p, state, dt, np.array(voltages[:count]), aiding, predicted)
+        state, heading = kind.algorithm.step(
+            p, state, memory, dt, np.array(voltages[:count]), predicting(predicted, aiding)
+        )
         assert_sane(heading)
 
 
@@ -125,18 +132,22 @@ def test_any_sequence_with_parameters_at_the_ends_of_their_ranges(kind, cycles, 
             low = None if parameter.open_low else parameter.low
             known = [end for end in (parameter.default, low, parameter.high) if end is not None]
             ends[parameter.name.replace(".", "__")] = st.sampled_from(known)
-    p, state = build(kind, count, **data.draw(st.fixed_dictionaries(ends), "parameters"))
+    p, state, memory = build(kind, count, **data.draw(st.fixed_dictionaries(ends), "parameters"))
     for voltages, aiding, dt, predicted in cycles:
-        state, heading = kind.algorithm.step(p, state, dt, np.array(voltages[:count]), aiding, predicted)
+        state, heading = kind.algorithm.step(
+            p, state, memory, dt, np.array(voltages[:count]), predicting(predicted, aiding)
+        )
         assert_sane(heading, largest_variance=100.0)
 
 
 @BY_COUNT
 @pytest.mark.parametrize("level", [0.0, 1e-300, 0.5, 1.0, 1e30, 1e90, 1e200])
 def test_all_outputs_equal(kind, options, count, level):
-    p, state = build(kind, count, **options)
+    p, state, memory = build(kind, count, **options)
     for _ in range(50):
-        state, heading = kind.algorithm.step(p, state, 0.1, np.full(count, level), TURNING, PREDICTION_SUNLIT)
+        state, heading = kind.algorithm.step(
+            p, state, memory, 0.1, np.full(count, level), predicting(PREDICTION_SUNLIT, TURNING)
+        )
         assert_sane(heading)
     assert (heading.validity == VALIDITY_VALID) == (0.5 <= level < 1e100)
 
@@ -145,11 +156,11 @@ def test_all_outputs_equal(kind, options, count, level):
 def test_one_dead_reading_costs_one_cell(kind, options):
     """A NaN is a dark cell: the heading comes from the others."""
     count = next(n for n in (8, *layouts(kind)) if n in layouts(kind))
-    p, state = build(kind, count, **options)
+    p, state, memory = build(kind, count, **options)
     voltages = outputs_of(kind, count, SUN_B)
     voltages[np.argmin(voltages)] = math.nan
     for _ in range(100):
-        state, heading = kind.algorithm.step(p, state, 0.1, voltages, UNAIDED, PREDICTION_SUNLIT)
+        state, heading = kind.algorithm.step(p, state, memory, 0.1, voltages, predicting(PREDICTION_SUNLIT))
     assert heading.validity == VALIDITY_VALID
     assert_sane(heading)
     assert np.dot(heading.sun_b, SUN_B) > math.cos(math.radians(60.0))
@@ -157,6 +168,6 @@ def test_one_dead_reading_costs_one_cell(kind, options):
 
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if 32 in layouts(kind)], ids=executable)
 def test_32_cells_use_the_whole_mask(kind):
-    p, state = build(kind, 32)
-    _, heading = kind.algorithm.step(p, state, 0.1, np.ones(32), UNAIDED, -1)
+    p, state, memory = build(kind, 32)
+    _, heading = kind.algorithm.step(p, state, memory, 0.1, np.ones(32), UNAIDED)
     assert heading.lit_mask == 2**32 - 1

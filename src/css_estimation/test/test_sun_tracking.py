@@ -42,7 +42,7 @@ class Flight:
         seen = (cosines >= 0.5 - 1e-12) & (NORMALS[:, 2] * self.sun_b[2] > 0.0)
         voltages = np.where(seen, cosines, 0.0) * lit
         aiding = UNAIDED._replace(gyro_b=omega, gyro_valid=gyro)
-        self.state, heading = self.estimator.step(self.p, self.state, dt, voltages, aiding, -1)
+        self.state, heading = self.estimator.step(self.p, self.state, None, dt, voltages, aiding)
         return heading
 
     def fly(self, steps, **conditions):
@@ -97,7 +97,7 @@ def test_a_gyro_reading_that_is_none_counts_as_off(estimator, reading):
     flight = Flight(estimator)
     flight.fly(2)
     aiding = UNAIDED._replace(gyro_b=reading, gyro_valid=True)
-    flight.state, heading = estimator.step(flight.p, flight.state, DT, np.ones(8), aiding, -1)
+    flight.state, heading = estimator.step(flight.p, flight.state, None, DT, np.ones(8), aiding)
     assert heading.rate_source != RATE_GYRO
     assert all(map(math.isfinite, (*heading.sun_b, *heading.omega_bn_b)))
 

@@ -65,7 +65,7 @@ def fly_ideal(seed):
         # q dt of the filter is the variance of the angle that the rate noise adds in a step
         measured = tuple(np.add(omega, PROCESS_SIGMA / math.sqrt(DT) * rng.normal(size=3)).tolist())
         outputs = NORMALS @ sun_b + CELL_SIGMA * rng.normal(size=8)
-        state, heading = sunline_ekf.step(p, state, DT, outputs, with_gyro(measured), -1)
+        state, heading = sunline_ekf.step(p, state, None, DT, outputs, with_gyro(measured))
         helper = np.eye(3)[np.argmin(np.abs(heading.sun_b))]
         e1 = np.cross(heading.sun_b, helper)
         e1 /= np.linalg.norm(e1)
@@ -136,7 +136,7 @@ def test_tracks_a_turning_sun_that_one_or_two_cells_see():
     for _ in range(1200):
         sun_b = turned(sun_b, omega)
         outputs = cell_outputs(sun_b)
-        state, heading = sunline_ekf.step(p, state, DT, outputs, with_gyro(omega), -1)
+        state, heading = sunline_ekf.step(p, state, None, DT, outputs, with_gyro(omega))
         errors.append(angle_between(heading.sun_b, sun_b))
         lit.append(np.count_nonzero(outputs))
     assert max(lit) <= 2
@@ -152,7 +152,7 @@ def test_without_gyro_it_converges_once_more_cells_see_the_sun():
     for _ in range(1200):
         sun_b = turned(sun_b, omega)
         outputs = cell_outputs(sun_b)
-        state, heading = sunline_ekf.step(p, state, DT, outputs, UNAIDED, -1)
+        state, heading = sunline_ekf.step(p, state, None, DT, outputs, UNAIDED)
         few = np.count_nonzero(outputs) <= 2
         error = angle_between(heading.sun_b, sun_b)
         if not few and error < math.radians(2.0):
@@ -178,5 +178,5 @@ def test_finds_the_sun_from_a_wrong_start(seed):
     )
     for _ in range(900):
         sun_b = turned(sun_b, omega)
-        state, heading = sunline_ekf.step(p, state, DT, cell_outputs(sun_b), with_gyro(omega), -1)
+        state, heading = sunline_ekf.step(p, state, None, DT, cell_outputs(sun_b), with_gyro(omega))
     assert angle_between(heading.sun_b, sun_b) < math.radians(8.0)

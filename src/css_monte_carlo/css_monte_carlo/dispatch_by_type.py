@@ -17,9 +17,9 @@ from numba.extending import overload
 from css_monte_carlo.surroundings import references_at
 
 
-def estimate_heading(p, state, dt, voltages, aiding, eclipse_predicted):
+def estimate_heading(p, state, memory, dt, voltages, aiding):
     """State and `SunHeading` after one cycle of a Sun estimator; arguments in `css_estimation.sun.sun_algorithm`."""
-    return _heading_step(_home(p))(p, state, dt, voltages, aiding, eclipse_predicted)
+    return _heading_step(_home(p))(p, state, memory, dt, voltages, aiding)
 
 
 def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
@@ -62,17 +62,17 @@ def _home(p: Any) -> ModuleType | None:
 
 
 @overload(estimate_heading, jit_options={"forceinline": True})
-def _overload_heading(p, state, dt, voltages, aiding, eclipse_predicted):
+def _overload_heading(p, state, memory, dt, voltages, aiding):
     return _heading_step(_home(p))
 
 
 def _heading_step(home):
     if home is None:
-        return lambda p, state, dt, voltages, aiding, eclipse_predicted: (None, None)
+        return lambda p, state, memory, dt, voltages, aiding: (None, None)
     step = home.step
 
-    def call(p, state, dt, voltages, aiding, eclipse_predicted):
-        return step(p, state, dt, voltages, aiding, eclipse_predicted)
+    def call(p, state, memory, dt, voltages, aiding):
+        return step(p, state, memory, dt, voltages, aiding)
 
     return call
 

@@ -18,7 +18,7 @@ from css_environment.albedo_vector import PATCHES, point_source
 from css_estimation.sun.sun_heading import Aiding
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
 from css_monte_carlo.step_truth import Truth
-from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
+from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
 from css_sim import gyro, magnetometer
 from css_sim.disturbances import Disturbances
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
@@ -35,6 +35,7 @@ class Vehicle(NamedTuple):
     albedo_model: int  # of `albedo_vector`
     heading_hears_field: bool
     control_hears_field: bool
+    heading_hears_wheels: bool
     heading: Any  # parameters of the Sun estimator, or None
     attitude: Any  # parameters of the attitude filter, or None
     control: Any  # parameters of the control law, or None
@@ -69,8 +70,9 @@ class CaseState(NamedTuple):
 
     rotation: RotationState
     heading: Any
+    heading_memory: Any  # arrays of the Sun estimator, advanced in place
     attitude: Any
-    memory: Any  # arrays of the attitude filter, advanced in place
+    memory: Any  # the same of the attitude filter
     control: Any
     field_b: Vec3  # [T] last measurement of the field
     field_step: int  # when it was taken; -1: never
@@ -137,7 +139,7 @@ def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
     rotation, heading, attitude, control, field_b, field_step = _fly_steps(
         v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace
     )
-    return CaseState(rotation, heading, attitude, state.memory, control, field_b, field_step)
+    return CaseState(rotation, heading, state.heading_memory, attitude, state.memory, control, field_b, field_step)
 
 
 @kernel
@@ -161,17 +163,22 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
         if read.field_valid:
             field_b, field_step = read.field_b, step
-        aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, v.heading_hears_field and read.field_valid)
+        wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
+        field_is_new = v.heading_hears_field and read.field_valid
+        aiding = Aiding(
+            read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky_at(around, k)
+        )
         heading_state, heading = estimate_heading(
-            v.heading, heading_state, since_s, voltages, aiding, around.predicted[k]
+            v.heading, heading_state, state.heading_memory, since_s, voltages, aiding
         )
         # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
         filtered_s = since_s if step > 0 else 0.0
-        aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid)
+        aiding = Aiding(
+            read.gyro_b, read.gyro_valid, read.field_b, read.field_valid, speeds, False, sky_at(around, k)
+        )
         attitude_state, attitude = estimate_attitude(
             v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
         )
-        wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
         # as the control node has it: the last measurement, for as long as the next may be on its way
         field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
         control_state = command(

@@ -21,7 +21,7 @@ from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
 from css_estimation.attitude.attitude_options import GivenStart
 from css_estimation.nodes.attitude_filter import AttitudeFilter
-from css_estimation.sun.sun_estimator import SunEstimator
+from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.case_tallies import step_marks
 from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
@@ -155,16 +155,22 @@ class MissionFlight:
             albedo=np.zeros((len(keys), len(nominal))),
             work=aligned_table(len(keys), len(new_workspace())),
         )
-        heading = control = None
-        if self._heading is not None:
-            heading = _algorithm(self._heading).initial_state(_parameters(self._heading, self._heading.values))
+        control = None
         if self._control is not None:
             control = sun_pointing_control.initial_state(sun_pointing_control.parameters(self._control.values))
         states = []
         for key, rotation in zip(keys, rotations, strict=True):
             attitude, memory = self._initial_attitude(key, rotation.sigma_bn, guess_deg)
-            states.append(CaseState(rotation, heading, attitude, memory, control, _NOWHERE, -1))
+            heading, heading_memory = self._initial_heading()
+            states.append(CaseState(rotation, heading, heading_memory, attitude, memory, control, _NOWHERE, -1))
         return tables, states
+
+    def _initial_heading(self) -> tuple[Any, Any]:
+        """State and memory of the Sun estimator."""
+        if self._heading is None:
+            return None, None
+        algorithm, p = _algorithm(self._heading), _parameters(self._heading, self._heading.values)
+        return algorithm.initial_state(p), algorithm.initial_memory(p)
 
     def _initial_attitude(self, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> tuple[Any, Any]:
         """State and memory of the attitude filter."""
@@ -185,7 +191,7 @@ class MissionFlight:
         )
         has_field = self._magnetometer is not None
         control_hears = has_field and control is not None and plant.rods.fitted
-        heading_hears = has_field and heading is not None and heading.rate.use_field
+        heading_hears = has_field and heading is not None and hears_field(heading)
         is_heard = control_hears or heading_hears or (has_field and attitude is not None)
         x, y, z = (float(c) for c in plant.spacecraft.array_normal)
         return Vehicle(
@@ -195,6 +201,7 @@ class MissionFlight:
             albedo_model=MODELS[array.albedo.model],
             heading_hears_field=heading_hears,
             control_hears_field=control_hears,
+            heading_hears_wheels=heading is not None and hears_wheels(heading),
             heading=_parameters(self._heading, heading),
             attitude=_parameters(self._filter, attitude),
             control=None if control is None else sun_pointing_control.parameters(control),

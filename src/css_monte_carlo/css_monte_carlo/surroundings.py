@@ -19,8 +19,9 @@ from css_environment.earth_light import EarthView, gather_light, look_at_earth, 
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.attitude.flight_references import FlightReferences, References
-from css_estimation.sun.eclipse_prediction import EclipsePrediction
-from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN
+from css_estimation.sun import flight_sky
+from css_estimation.sun.flight_sky import FlightSky
+from css_estimation.sun.sun_heading import Sky
 from css_sim.flight_environment import flight_environment
 
 BLOCK_STEPS = 1200
@@ -47,12 +48,25 @@ REFERENCE = np.dtype(
 )
 """`References` of one step."""
 
+SKY = np.dtype(
+    [
+        ("known", np.bool_),
+        ("predicted", np.int64),
+        ("sun_n", np.float64, 3),
+        ("solar_flux", np.float64),
+        ("illumination", np.float64),
+    ],
+    align=True,
+)
+"""`Sky` of one step, without the light of the Earth."""
+
 
 class Surroundings(NamedTuple):
     """Tables of one block of K steps."""
 
     states: np.ndarray  # (K,) of STATE
-    predicted: np.ndarray  # (K,) what the Sun estimator's orbit model says about the shadow
+    sky: np.ndarray  # (K,) of SKY, what the Sun estimator's own models say; (1,) when it has none
+    sky_light: np.ndarray  # (K, 192) light of the Earth by them; (1, 192) when it predicts none
     references: np.ndarray  # (K,) of REFERENCE, what the attitude filter's models say; (0,) without one
     predicted_light: np.ndarray  # (K, 192) patches of light by them; (1, 192) when no filter takes albedo off
     light: np.ndarray  # (K, 192) patches of light of the Earth; (1, 192) when each case has its own Earth, or none
@@ -85,6 +99,15 @@ def references_at(table, k: int) -> References:
         r.sunlit,
         (r.field_n[0], r.field_n[1], r.field_n[2]),
     )
+
+
+@kernel
+def sky_at(around: Surroundings, k: int) -> Sky:
+    """What the Sun estimator's models say at a step."""
+    s = around.sky[min(k, around.sky.shape[0] - 1)]
+    light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
+    sun_n = (s.sun_n[0], s.sun_n[1], s.sun_n[2])
+    return Sky(s.known, s.predicted, sun_n, s.solar_flux, s.illumination, light)
 
 
 @outer_kernel
@@ -131,7 +154,7 @@ class SurroundingsTables:
 
     Args:
         plant: values of the node that owns the truth (its orbit, shadow and field).
-        heading: values of the Sun estimator that flies (its eclipse prediction); None: none flies.
+        heading: values of the Sun estimator that flies (its own models); None: none flies.
         attitude: values of the attitude filter that flies (its own models); None: none flies.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
@@ -150,9 +173,7 @@ class SurroundingsTables:
         albedo_model: int = PATCHES,
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field)
-        self._prediction: EclipsePrediction | None = None
-        if heading is not None and heading.eclipse.source != "sensors":
-            self._prediction = EclipsePrediction(heading)
+        self._sky: FlightSky | None = None if heading is None else flight_sky.flight_sky(heading)
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
@@ -191,10 +212,6 @@ class SurroundingsTables:
 
     def _make(self, first: int, count: int) -> Surroundings:
         states = self.states(first, count)
-        predicted = np.full(count, PREDICTION_UNKNOWN, np.int64)
-        if self._prediction is not None:
-            for k in range(count):
-                predicted[k] = self._prediction.at(self._epoch_ns + (first + k) * self._period_ns)
         grid = self._reflectivity
         has_light = grid is not None and not self._own_earth
         light = aligned_table(count if has_light else 1, len(new_light()))
@@ -204,7 +221,19 @@ class SurroundingsTables:
             _tabulate_views(states, views, *grid.shape)
         elif grid is not None and has_light:
             _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
-        return Surroundings(states, predicted, *self._modelled(first, count), light, views)
+        return Surroundings(states, *self._skies(first, count), *self._modelled(first, count), light, views)
+
+    def _skies(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """What the Sun estimator's models say, and the light that they predict."""
+        rows = 1 if self._sky is None else count
+        skies = np.zeros(rows, SKY)
+        light = aligned_table(rows if self._sky is not None and self._sky.has_light else 1, len(new_light()))
+        for k in range(rows):
+            *row, now = flight_sky.sky_at(self._sky, self._epoch_ns + (first + k) * self._period_ns)
+            skies[k] = tuple(row)
+            if k < len(light):
+                light[k] = now
+        return skies, light
 
     def _modelled(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """What the attitude filter's models say, and the light that they predict."""

@@ -14,6 +14,7 @@ from css_estimation.sun.cell_layout import brightest
 from css_estimation.sun.eclipse_detector import detect_eclipse
 from css_estimation.sun.flat_faces import FLAT_CELLS, faces_of_cells, flat_heading
 from css_estimation.sun.safe_hold import DEFAULTS, MODE_FLAT, MODE_NO_SUN, CellsVerdict, finish_safe_hold
+from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import Aiding, SunHeading
 from css_estimation.sun.sun_tracking import TrackingParameters, TrackingState, elapsed
 
@@ -34,6 +35,9 @@ def conflicts(values: Values) -> Iterator[str]:
     return flat_faces.conflicts(values)
 
 
+initial_memory = no_memory
+
+
 def initial_state(p: FlatParameters) -> TrackingState:
     """No estimate yet."""
     return sun_tracking.initial_state()
@@ -43,16 +47,16 @@ def initial_state(p: FlatParameters) -> TrackingState:
 def step(
     p: FlatParameters,
     state: TrackingState,
+    memory: None,
     dt: float,
     voltages,
     aiding: Aiding,
-    eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0
-    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, eclipse_predicted)
+    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
     sun_b, mask = flat_heading(p.faces, voltages)
     verdict = CellsVerdict(sun_b, mask, MODE_FLAT if mask != 0 else MODE_NO_SUN, False)
     return finish_safe_hold(p.tracking, state, dt, aiding, shadow, verdict)

@@ -33,6 +33,7 @@ from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import brightest, cell_layout, missing_cells
 from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
+from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, Covariance, SunHeading
 from css_estimation.sun.sun_patterns import NO_PATTERNS, find_pattern, sun_patterns
 from css_estimation.sun.sun_tracking import TrackingState
@@ -98,6 +99,9 @@ class NormalEquations(NamedTuple):
     matrix: Symmetric  # M = sum w n n^T
     squared: Symmetric  # sum w^2 n n^T
     vector: Vec3  # b = sum w V n
+
+
+initial_memory = no_memory
 
 
 def initial_state(p: LeastSquaresParameters) -> TrackingState:
@@ -201,12 +205,12 @@ def _covariance(sun_b: Vec3, p: Symmetric) -> Covariance:
 def step(
     p: LeastSquaresParameters,
     state: TrackingState,
+    memory: None,
     dt: float,
     voltages,
     aiding: Aiding,
-    eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     seen = least_squares(p, voltages, top)
-    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)
+    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, seen)

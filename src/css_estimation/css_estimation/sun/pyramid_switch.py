@@ -38,6 +38,7 @@ from css_estimation.sun.safe_hold import (
     CellsVerdict,
     finish_safe_hold,
 )
+from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import ECLIPSE_SUNLIT, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import TrackingParameters, TrackingState, elapsed
 
@@ -123,6 +124,9 @@ def conflicts(values: Values) -> Iterator[str]:
         yield f"pyramid.cells: normals of cells {cells} have cosines up to {largest:.3g}, expected orthogonal ones"
 
 
+initial_memory = no_memory
+
+
 def initial_state(p: PyramidParameters) -> PyramidState:
     """On the flat cells, no estimate yet."""
     return PyramidState(False, sun_tracking.initial_state())
@@ -172,16 +176,16 @@ def select_cells(p: PyramidParameters, adopted: bool, voltages) -> tuple[bool, C
 def step(
     p: PyramidParameters,
     state: PyramidState,
+    memory: None,
     dt: float,
     voltages,
     aiding: Aiding,
-    eclipse_predicted: int,
 ) -> tuple[PyramidState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     top = brightest(voltages)
     largest = voltages[top] if top >= 0 else 0.0
-    shadow = detect_eclipse(p.tracking.eclipse, state.tracking.eclipse, dt, largest, eclipse_predicted)
+    shadow = detect_eclipse(p.tracking.eclipse, state.tracking.eclipse, dt, largest, aiding.sky.predicted)
     adopted, verdict = select_cells(p, state.adopted, voltages)
     tracking, heading = finish_safe_hold(p.tracking, state.tracking, dt, aiding, shadow, verdict)
     return PyramidState(adopted and shadow[1] == ECLIPSE_SUNLIT, tracking), heading

@@ -50,7 +50,6 @@ def finish_snapshot(
     voltages,
     top: int,
     aiding: Aiding,
-    eclipse_predicted: int,
     snapshot: Snapshot,
 ) -> tuple[TrackingState, SunHeading]:
     """The rest of a cycle: without a Sun the last heading is held, or turned with the gyro.
@@ -70,5 +69,5 @@ def finish_snapshot(
     restarted = state.validity != VALIDITY_VALID
     estimate = Estimate(sun_b, snapshot.covariance, valid, False, restarted, 0.0, 0, snapshot.lit_mask, snapshot.mode)
     largest = voltages[top] if top >= 0 else 0.0
-    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, eclipse_predicted)
+    shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
     return finish_cycle(p.tracking, state, dt, aiding, gyro_ok, shadow, estimate)

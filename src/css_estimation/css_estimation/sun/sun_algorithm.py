@@ -27,9 +27,17 @@ class SunAlgorithm(Protocol):
         """State before the first cycle, for given parameters."""
 
     @property
-    def step(self) -> Callable[[Any, Any, float, Any, Aiding, int], tuple[Any, SunHeading]]:
+    def initial_memory(self) -> Callable[[Any], Any]:
+        """Arrays that `step` advances in place, for given parameters; `no_memory` for an algorithm without."""
+
+    @property
+    def step(self) -> Callable[[Any, Any, Any, float, Any, Aiding], tuple[Any, SunHeading]]:
         """One cycle, a kernel.
 
-        Args: parameters; state; time [s] since the last step; voltages (N,) [-], NaN where one is missing; what other
-        sensors measured; `PREDICTION_*` of an orbit model. Gives the state after it and what it came to.
+        Args: parameters; state; memory; time [s] since the last step; voltages (N,) [-], NaN where one is missing; what
+        other sensors measured and models say. Gives the state after it and what it came to.
         """
+
+
+def no_memory(p: Any) -> None:
+    """Of an algorithm whose state is all that it carries from cycle to cycle."""

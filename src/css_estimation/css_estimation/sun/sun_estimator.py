@@ -4,20 +4,34 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+import numpy as np
+
 from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_common.sensor_inputs import field_input, gyro_input
-from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields
+from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
 from css_estimation.sun.eclipse_detector import SOURCE
-from css_estimation.sun.eclipse_prediction import EclipsePrediction
 from css_estimation.sun.field_rate import USE_FIELD
+from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
-from css_estimation.sun.sun_heading import PREDICTION_UNKNOWN, Aiding
+from css_estimation.sun.sun_heading import Aiding
 from css_estimation.sun.sun_tracking import RATE_CUTOFF
 from css_msgs.msg import SunEstimate
+
+_NO_SPEEDS = np.zeros(0)
+
+
+def hears_field(values: Values) -> bool:
+    """Whether an estimator with these values listens to the magnetometer."""
+    return hasattr(values.rate, "use_field") and values[USE_FIELD]
+
+
+def hears_wheels(values: Values) -> bool:
+    """Whether it listens to the speeds of the wheels."""
+    return hasattr(values, "use_wheels") and values.use_wheels and values.wheels.fitted and len(values.wheels.axes) > 0
 
 
 class SunEstimator(Component):
@@ -38,8 +52,10 @@ class SunEstimator(Component):
             cells_input(values),
             gyro_input(values),
         ]
-        if values[USE_FIELD]:
+        if hears_field(values):
             inputs.append(field_input(values))
+        if hears_wheels(values):
+            inputs.append(wheels_input(values))
         return tuple(inputs)
 
     @classmethod
@@ -62,11 +78,11 @@ class SunEstimator(Component):
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)
         self._state = self.algorithm.initial_state(self._parameters)
+        self._memory = self.algorithm.initial_memory(self._parameters)
         self._step = typed_call(self.algorithm.step)
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
-        sensors_decide = self.values[SOURCE] == "sensors"
-        self._prediction = None if sensors_decide else EclipsePrediction(self.values)
+        self._sky = flight_sky(self.values)
 
     def tune(self, values: Values) -> None:
         super().tune(values)
@@ -77,15 +93,21 @@ class SunEstimator(Component):
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
-        aiding = Aiding(*gyro_reading(received["gyro"]), *field_reading(received.get("field")))
-        predicted = PREDICTION_UNKNOWN if self._prediction is None else self._prediction.at(stamp_ns)
+        wheels = received.get("wheels")
+        aiding = Aiding(
+            *gyro_reading(received["gyro"]),
+            *field_reading(received.get("field")),
+            _NO_SPEEDS if wheels is None else wheels.speed,
+            wheels is not None,
+            sky_at(self._sky, stamp_ns),
+        )
         self._state, heading = self._step(
             self._parameters,
             self._state,
+            self._memory,
             since_ns / 1e9,
             cells.voltages,
             aiding,
-            predicted,
         )
         if self._mode_log is not None:
             line = self._mode_log.line(stamp_ns, heading.mode)

@@ -3,7 +3,10 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from css_common.vectors import Vec3
+from css_environment.earth_light import new_light
 
 # The numbers of css_msgs/SunEstimate.
 VALIDITY_NONE = 0
@@ -14,6 +17,7 @@ RATE_NONE = 0
 RATE_GYRO = 1
 RATE_SUN = 2
 RATE_FIELD = 3
+RATE_MOMENTUM = 4
 
 ECLIPSE_SUNLIT = 0
 ECLIPSE_ECLIPSED = 1
@@ -29,17 +33,35 @@ Covariance = tuple[float, float, float, float, float, float, float, float, float
 NO_COVARIANCE: Covariance = (-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+class Sky(NamedTuple):
+    """What the flight's own models say about Sun and Earth at its place; with unknown place all else is without use."""
+
+    known: bool  # there is an orbit model
+    predicted: int  # PREDICTION_*: what it says about the shadow
+    sun_n: Vec3  # [-] unit vector to the Sun
+    solar_flux: float  # [-] of the Sun in full view, 1 at 1 AU
+    illumination: float  # [-] part of the Sun's disc in view
+    light: np.ndarray  # (192,) light of the Earth as `css_environment.earth_light.new_light`; zeros: not predicted
+
+
+UNKNOWN_SKY = Sky(False, PREDICTION_UNKNOWN, (1.0, 0.0, 0.0), 1.0, 1.0, new_light())
+"""No orbit model."""
+
+
 class Aiding(NamedTuple):
-    """What other sensors measured in this cycle."""
+    """What is known in this cycle beside the cells: measurements of other sensors and models."""
 
     gyro_b: Vec3  # [rad/s] body rate
     gyro_valid: bool
     field_b: Vec3  # [T] geomagnetic field
     field_valid: bool  # measured in this very cycle; False while the next measurement is not due
+    wheel_speeds: np.ndarray  # (N,) [rad/s] of the reaction wheels relative to the body
+    wheels_valid: bool
+    sky: Sky
 
 
-UNAIDED = Aiding((0.0, 0.0, 0.0), False, (0.0, 0.0, 0.0), False)
-"""No other sensor."""
+UNAIDED = Aiding((0.0, 0.0, 0.0), False, (0.0, 0.0, 0.0), False, np.zeros(0), False, UNKNOWN_SKY)
+"""The cells alone."""
 
 
 class SunHeading(NamedTuple):

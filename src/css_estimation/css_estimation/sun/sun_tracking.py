@@ -48,23 +48,20 @@ from css_estimation.sun.sun_rate import rate_from_sun_vectors
 _LONGEST_STEP = 1e9  # [s]
 
 RATE_CUTOFF = real("rate.cutoff", 0.1, "Hz", "corner of the first-order low-pass on the rate", low=0.0, high=1e3)
+USE_GYRO = flag("use_gyro", True, "use the gyro while it delivers; off: rates from Sun vectors", tunable=True)
+GYRO_LIMIT = real("rate.gyro_limit_deg_s", 300.0, "deg/s", "a gyro reading beyond it is not used", low=0.0, high=1e4)
 
 
 class TrackingParameters(NamedTuple):
     """Rates in rad/s."""
 
-    use_gyro: bool = given(
-        flag("use_gyro", True, "use the gyro while it delivers; off: rates from Sun vectors", tunable=True)
-    )
+    use_gyro: bool = given(USE_GYRO)
     cutoff: float = given(RATE_CUTOFF)
     rate_limit: float = made(
         math.radians,
         real("rate.limit_deg_s", 10.0, "deg/s", "bound on each axis of a Sun-derived rate", low=0.0, high=360.0),
     )
-    gyro_limit: float = made(
-        math.radians,
-        real("rate.gyro_limit_deg_s", 300.0, "deg/s", "a gyro reading beyond it is not used", low=0.0, high=1e4),
-    )
+    gyro_limit: float = made(math.radians, GYRO_LIMIT)
     hold_rate: bool = made(
         lambda word: word == "hold",
         choice("rate.without_information", "hold", ("hold", "zero"), "filtered rate while none is measured"),

@@ -36,6 +36,7 @@ from css_estimation.sun.cell_layout import READABLE, CellLayout, brightest, cell
 from css_estimation.sun.eclipse_detector import detect_eclipse
 from css_estimation.sun.lit_cells import Gate
 from css_estimation.sun.snapshot import MODE_NO_SUN
+from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import (
     Estimate,
@@ -135,6 +136,9 @@ def heading_gain(values: Values) -> float:
     return before / (before + r)
 
 
+initial_memory = no_memory
+
+
 def initial_state(p: EkfParameters) -> EkfState:
     """Waiting for light."""
     return EkfState(False, (p.initial_variance, 0.0, 0.0) * 2, sun_tracking.initial_state())
@@ -175,10 +179,10 @@ def update_cells(
 def step(
     p: EkfParameters,
     state: EkfState,
+    memory: None,
     dt: float,
     voltages,
     aiding: Aiding,
-    eclipse_predicted: int,
 ) -> tuple[EkfState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
@@ -230,6 +234,6 @@ def step(
         mask,
         mode,
     )
-    shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, eclipse_predicted)
+    shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, aiding.sky.predicted)
     tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)
     return EkfState(started, covariance, tracking), heading

@@ -17,6 +17,7 @@ from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest
 from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
+from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
 
@@ -36,6 +37,9 @@ class WavgParameters(NamedTuple):
 
 PARAMETERS = table_of(WavgParameters)
 parameters = builder(WavgParameters)
+
+
+initial_memory = no_memory
 
 
 def initial_state(p: WavgParameters) -> TrackingState:
@@ -74,13 +78,13 @@ def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tupl
 def step(
     p: WavgParameters,
     state: TrackingState,
+    memory: None,
     dt: float,
     voltages,
     aiding: Aiding,
-    eclipse_predicted: int,
 ) -> tuple[TrackingState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
     seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)
-    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, eclipse_predicted, seen)
+    return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, seen)

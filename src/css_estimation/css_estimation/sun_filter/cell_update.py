@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the outputs of the cells say about the state of the Sun filter.
+
+The model of cell i with the normal n_i,
+
+    V_i = dark_i + gain_i (1 + g_i) scale (1 + SCALE + COMMON) R(flux max(0, n_i.s) seen_i + a_i (1 + EARTH) + c a_i u_i),
+
+R being the response, a_i the light of the mean Earth at the estimated attitude, u_i what clouds add to it in units of
+c a_i. Where the Earth is not predicted a_i is half of its largest, and its error is white noise.
+
+Which cells see the Sun follows from the estimate. Its error decides for which of them that is sure: the others, next to
+the edge of a view, are left out, since a linear filter cannot use a step. A reading that the model explains worse than
+`gate` allows is refused.
+
+Updates are scalar, in sequence, in symmetric form: of the covariance S >= R > 0 is taken what the reading took away.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.attitude import rotation_vector_to_dcm
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, add, cross, dot, matmul, multiply, multiply_transposed, norm, scale
+from css_environment.albedo_gradient import albedo_gradient
+from css_estimation.sun_filter.memory import (
+    COMMON,
+    EARTH,
+    GAIN,
+    RATE,
+    SCALE,
+    THETA,
+    X_EARTH,
+    X_GAIN,
+    X_RATE,
+    X_SCALE,
+    dcm_of,
+    forget,
+    quadratic,
+    set_dcm,
+)
+from css_estimation.sun_filter.options import SunFilterParameters
+from css_estimation.sun_filter.response import respond
+
+READABLE = 1e3
+"""Beyond it a number is no output of a cell."""
+
+# Width of what is left out on both sides of an edge of view, in cosines: at least, by the heading's error, at most.
+_MARGIN_LEAST, _MARGIN_BY_SIGMA, _MARGIN_MOST = 0.03, 2.0, 0.15
+# A step in the output smaller than this is none.
+_SMALLEST_STEP = 0.05
+# Below so many standard deviations of noise, model and reading, a cell is dark and says nothing.
+_DARK = 3.0
+# Without a converged heading nothing is refused [rad].
+_CONVERGED = 0.3
+# Corrections longer than this [rad] are cut.
+_LONGEST = 0.5
+_LEAST_EARTH = -0.9
+
+
+class CellReading(NamedTuple):
+    """What the filter made of a cycle's outputs."""
+
+    nis: float
+    nis_dof: int
+    used: int  # mask
+    refused: int  # mask
+    contrary: int  # cells that are lit or dark where the estimate has it the other way round
+    likelihood: float  # logarithm, but for a constant
+    sigma: float  # [rad] error of the heading before, mean of two axes
+
+
+NOTHING_READ = CellReading(0.0, 0, 0, 0, 0, 0.0, 9.0)
+
+
+@kernel
+def heading_sigma(covariance, sun_n: Vec3) -> float:
+    """Error of the heading [rad], 1 sigma, mean of the two axes across it."""
+    total = covariance[THETA, THETA] + covariance[THETA + 1, THETA + 1] + covariance[THETA + 2, THETA + 2]
+    return math.sqrt(max(0.0, 0.5 * (total - quadratic(covariance, THETA, sun_n))))
+
+
+@kernel
+def view_of(p: SunFilterParameters, i: int, sun_b: Vec3, margin: float) -> tuple[float, bool, bool]:
+    """Cosine of the Sun on cell i, whether it sees the Sun, and whether that is in doubt within a margin of cosines."""
+    cell = p.cells[i]
+    cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
+    seen = cosine >= p.cos_half_view
+    doubtful = p.cos_half_view > _SMALLEST_STEP and abs(cosine - p.cos_half_view) < margin
+    if cell.side != 0.0:
+        above = dot(p.screen.axis_b, sun_b) * (1.0 if cell.side > 0.0 else -1.0)
+        seen = seen and above > 0.0
+        if cosine > _SMALLEST_STEP and abs(above) < margin:
+            doubtful = cosine > p.cos_half_view - margin
+        elif above < 0.0:
+            doubtful = False
+    return cosine, seen, doubtful
+
+
+@kernel
+def read_cells(
+    p: SunFilterParameters, voltages, sun_n: Vec3, flux: float, earth_known: bool, light, states: int, x, covariance,
+    earth, work,
+) -> CellReading:
+    """Updates an estimate with all cells.
+
+    Args:
+        flux: of the Sun [-], 1 at 1 AU.
+        earth_known: `light` is that of the Earth; else it is unknown.
+        states: how many of the states are in use.
+        earth, work: room, of `SunFilterMemory`.
+    """
+    dcm_bn = dcm_of(x)
+    cells = voltages.shape[0]
+    if earth_known:
+        albedo_gradient(light, p.cells, p.screen, p.cos_half_view, dcm_bn, earth)
+    sun_b = multiply(dcm_bn, sun_n)
+    sigma = heading_sigma(covariance, sun_n)
+    margin = min(_MARGIN_LEAST + _MARGIN_BY_SIGMA * sigma, _MARGIN_MOST)
+    forget(covariance, COMMON, 1, p.errors.common)
+    gained, correction = work[0], work[1]
+    for j in range(states):
+        correction[j] = 0.0
+    scale_now = p.response.scale * (1.0 + x[X_SCALE])
+    earth_factor = 1.0 + x[X_EARTH] if earth_known else 0.0
+    dark = _DARK * math.sqrt(p.errors.noise)
+    nis, likelihood = 0.0, 0.0
+    dof, used, refused, contrary = 0, 0, 0, 0
+    for i in range(cells):
+        v = voltages[i]
+        # a NaN compares false
+        if not abs(v) < READABLE:
+            continue
+        cell = p.cells[i]
+        v -= cell.dark
+        cosine, seen, doubtful = view_of(p, i, sun_b, margin)
+        if doubtful:
+            continue
+        mean_light = earth[i, 0] if earth_known else 0.0
+        albedo = earth_factor * mean_light if earth_known else 0.5 * p.earth.unknown
+        cloud = p.earth.clouds * mean_light
+        cloud_state = GAIN + cells + i
+        received = albedo + (cloud * x[X_GAIN + cells + i] if earth_known else 0.0)
+        if seen:
+            received += flux * max(cosine, 0.0)
+        output, slope = respond(p.response, received)
+        factor = cell.gain * (1.0 + x[X_GAIN + i])
+        expected = factor * scale_now * output
+        if expected < dark and v < dark:
+            continue
+        if not earth_known and not seen and v < p.earth.largest * flux:
+            continue
+        slope *= factor * scale_now
+        toward_n = (0.0, 0.0, 0.0)
+        if earth_known:
+            toward_n = (earth_factor * earth[i, 1], earth_factor * earth[i, 2], earth_factor * earth[i, 3])
+        if seen:
+            toward_n = add(toward_n, scale(flux, sun_n))
+        normal_n = multiply_transposed(dcm_bn, (cell.nx, cell.ny, cell.nz))
+        # the normal in n turns with the error: d(n) = theta x n
+        by_theta = scale(slope, cross(normal_n, toward_n))
+        by_scale = factor * p.response.scale * output
+        by_earth = slope * mean_light
+        by_gain = cell.gain * scale_now * output
+        by_cloud = slope * cloud
+        innovation = v - expected
+        innovation -= by_theta[0] * correction[0] + by_theta[1] * correction[1] + by_theta[2] * correction[2]
+        innovation -= by_scale * correction[SCALE] + expected * correction[COMMON] + by_gain * correction[GAIN + i]
+        if earth_known:
+            innovation -= by_earth * correction[EARTH] + by_cloud * correction[cloud_state]
+        noise = p.errors.noise
+        if not earth_known:
+            noise += p.earth.unknown * p.earth.unknown
+        for j in range(states):
+            total = by_theta[0] * covariance[j, 0] + by_theta[1] * covariance[j, 1] + by_theta[2] * covariance[j, 2]
+            total += by_scale * covariance[j, SCALE] + expected * covariance[j, COMMON]
+            total += by_gain * covariance[j, GAIN + i]
+            if earth_known:
+                total += by_earth * covariance[j, EARTH] + by_cloud * covariance[j, cloud_state]
+            gained[j] = total
+        variance = noise + by_theta[0] * gained[0] + by_theta[1] * gained[1] + by_theta[2] * gained[2]
+        variance += by_scale * gained[SCALE] + expected * gained[COMMON] + by_gain * gained[GAIN + i]
+        if earth_known:
+            variance += by_earth * gained[EARTH] + by_cloud * gained[cloud_state]
+        squared = innovation * innovation / variance
+        likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(variance))
+        if squared > p.convergence.gate and sigma < _CONVERGED:
+            refused |= 1 << i
+            if abs(v - expected) > p.earth.largest * flux:
+                contrary += 1
+            continue
+        nis += squared
+        dof += 1
+        used |= 1 << i
+        for j in range(states):
+            share = gained[j] / variance
+            correction[j] += share * innovation
+            for k in range(states):
+                covariance[j, k] -= share * gained[k]
+    _correct(x, correction, cells, earth_known)
+    return CellReading(nis, dof, used, refused, contrary, likelihood, sigma)
+
+
+@kernel
+def _correct(x, correction, cells: int, earth_known: bool) -> None:
+    """Adds the corrections to an estimate."""
+    theta = (correction[0], correction[1], correction[2])
+    length = norm(theta)
+    if length > _LONGEST:
+        theta = scale(_LONGEST / length, theta)
+    set_dcm(x, matmul(dcm_of(x), rotation_vector_to_dcm(theta)))
+    for i in range(3):
+        x[X_RATE + i] += correction[RATE + i]
+    x[X_SCALE] += correction[SCALE]
+    for i in range(cells):
+        x[X_GAIN + i] += correction[GAIN + i]
+    if earth_known:
+        x[X_EARTH] = max(_LEAST_EARTH, x[X_EARTH] + correction[EARTH])
+        for i in range(cells):
+            x[X_GAIN + cells + i] += correction[GAIN + cells + i]

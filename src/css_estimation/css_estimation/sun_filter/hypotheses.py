@@ -1,0 +1,183 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attitudes that may be the right one: how they begin, which are given up, and the turn about the Sun line among them.
+
+Cells alone say nothing about the turn about the Sun line; the light of the Earth does. Once the heading is known,
+`HYPOTHESES` attitudes that differ by that turn are followed, each a filter of its own, and weighed by how well they
+explain the outputs, until one is left.
+"""
+
+import math
+
+from css_common.attitude import rotation_vector_to_dcm
+from css_common.kernel import kernel
+from css_common.vectors import Mat3, Vec3, axes_across, matmul, multiply_transposed, scale
+from css_estimation.sun_filter.memory import (
+    DEAD,
+    EARTH,
+    GAIN,
+    HYPOTHESES,
+    SCALE,
+    THETA,
+    X_EARTH,
+    X_GAIN,
+    X_RATE,
+    SunFilterMemory,
+    dcm_of,
+    forget,
+    quadratic,
+    set_dcm,
+)
+from css_estimation.sun_filter.motion import begin_rate
+from css_estimation.sun_filter.options import SunFilterParameters
+
+# Outputs of one cycle to the next are alike in what the model has wrong: so much of each is news.
+_NEWS = 0.05
+# Logarithm of the weight, relative to the best, at which a hypothesis is given up.
+_GIVEN_UP = -12.0
+# Two hypotheses this near [rad] are one.
+_ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
+# Errors of a new hypothesis [rad2]: about the Sun line, and across it what the unknown Earth may have done.
+_ROLL_VARIANCE = 0.3**2
+_HEADING_VARIANCE = 0.05**2
+_SEARCH_VARIANCE = 0.1**2
+# Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: its
+# variance is kept above one that falls within this time [s] ...
+_SETTLING = 60.0
+# ... and goes on to grow, by what correlated clouds do [rad2/s].
+_ROLL_NOISE = 1e-5
+
+
+@kernel
+def onto_sun(sun_b: Vec3, sun_n: Vec3) -> Mat3:
+    """An attitude that has the Sun where it is, with any turn about it."""
+    b1, b2 = axes_across(sun_b)
+    n1, n2 = axes_across(sun_n)
+    rows = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for b, n in ((sun_b, sun_n), (b1, n1), (b2, n2)):
+        rows = (
+            _plus(rows[0], b[0], n),
+            _plus(rows[1], b[1], n),
+            _plus(rows[2], b[2], n),
+        )
+    return rows
+
+
+@kernel
+def _plus(row: Vec3, k: float, v: Vec3) -> Vec3:
+    return row[0] + k * v[0], row[1] + k * v[1], row[2] + k * v[2]
+
+
+@kernel
+def begin(
+    p: SunFilterParameters, m: SunFilterMemory, sun_b: Vec3, variance: float, sun_n: Vec3, model: int, wheels_b: Vec3
+) -> None:
+    """One hypothesis from a direction of the Sun in b, known to a variance [rad2]; its turn is a matter of definition."""
+    x, covariance = m.estimates[0], m.covariances[0]
+    set_dcm(x, onto_sun(sun_b, sun_n))
+    for i in range(X_RATE, x.shape[0]):
+        x[i] = 0.0
+    forget(covariance, 0, covariance.shape[0], 0.0)
+    across = variance + _SEARCH_VARIANCE
+    for i in range(3):
+        for j in range(3):
+            covariance[THETA + i, THETA + j] = across * ((1.0 if i == j else 0.0) - sun_n[i] * sun_n[j])
+    begin_rate(p.motion, model, (0.0, 0.0, 0.0), p.motion.start_rate, wheels_b, x, covariance)
+    cells = p.cells.shape[0]
+    covariance[SCALE, SCALE] = p.errors.scale
+    forget(covariance, GAIN, cells, p.errors.gain + p.errors.tilt)
+    follow_only(m, 0)
+
+
+@kernel
+def _copy(m: SunFilterMemory, source: int, target: int) -> None:
+    for i in range(m.estimates.shape[1]):
+        m.estimates[target, i] = m.estimates[source, i]
+    for i in range(m.covariances.shape[1]):
+        for j in range(m.covariances.shape[2]):
+            m.covariances[target, i, j] = m.covariances[source, i, j]
+
+
+@kernel
+def follow_only(m: SunFilterMemory, k: int) -> None:
+    """Makes one hypothesis the first and only one."""
+    if k != 0:
+        _copy(m, k, 0)
+    m.weights[0] = 0.0
+    for other in range(1, HYPOTHESES):
+        m.weights[other] = DEAD
+
+
+@kernel
+def look_for_roll(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3) -> None:
+    """Makes all hypotheses of the first, turned about the Sun line, with the Earth as an unknown of each."""
+    x, covariance = m.estimates[0], m.covariances[0]
+    cells = p.cells.shape[0]
+    x[X_EARTH] = 0.0
+    for i in range(cells):
+        x[X_GAIN + cells + i] = 0.0
+    forget(covariance, EARTH, 1, p.earth.scale)
+    forget(covariance, GAIN + cells, cells, 1.0)
+    for i in range(3):
+        for j in range(3):
+            covariance[THETA + i, THETA + j] += _HEADING_VARIANCE * ((1.0 if i == j else 0.0) - sun_n[i] * sun_n[j])
+    _widen(covariance, sun_n, _ROLL_VARIANCE)
+    for k in range(1, HYPOTHESES):
+        turn = rotation_vector_to_dcm(scale(2.0 * math.pi * k / HYPOTHESES, sun_n))
+        _copy(m, 0, k)
+        set_dcm(m.estimates[k], matmul(dcm_of(x), turn))
+        # what is known is known in the body, so that errors in n turn along
+        _turn(m.covariances[k], turn)
+    for k in range(HYPOTHESES):
+        m.weights[k] = 0.0
+
+
+@kernel
+def _turn(covariance, turn: Mat3) -> None:
+    for j in range(covariance.shape[0]):
+        a = multiply_transposed(turn, (covariance[THETA, j], covariance[THETA + 1, j], covariance[THETA + 2, j]))
+        covariance[THETA, j], covariance[THETA + 1, j], covariance[THETA + 2, j] = a
+    for j in range(covariance.shape[0]):
+        a = multiply_transposed(turn, (covariance[j, THETA], covariance[j, THETA + 1], covariance[j, THETA + 2]))
+        covariance[j, THETA], covariance[j, THETA + 1], covariance[j, THETA + 2] = a
+
+
+@kernel
+def _widen(covariance, axis_n: Vec3, variance: float) -> None:
+    for i in range(3):
+        for j in range(3):
+            covariance[THETA + i, THETA + j] += variance * axis_n[i] * axis_n[j]
+
+
+@kernel
+def loosen_roll(covariance, sun_n: Vec3, since: float, dt: float) -> None:
+    """Keeps the variance about the Sun line [rad2] above what `since` [s] the hypotheses began is credible."""
+    floor = _ROLL_VARIANCE * math.exp(-2.0 * since / _SETTLING)
+    _widen(covariance, sun_n, max(_ROLL_NOISE * dt, floor - quadratic(covariance, THETA, sun_n)))
+
+
+@kernel
+def weigh(m: SunFilterMemory, k: int, likelihood: float) -> None:
+    """Adds the likelihood of a cycle's outputs to the weight of a hypothesis."""
+    m.weights[k] += _NEWS * likelihood
+
+
+@kernel
+def give_up(m: SunFilterMemory) -> tuple[int, int]:
+    """Gives up what is unlikely, or the same as the best; gives the best one and how many are left."""
+    best = 0
+    for k in range(HYPOTHESES):
+        if m.weights[k] > m.weights[best]:
+            best = k
+    left = 0
+    highest = m.weights[best]
+    for k in range(HYPOTHESES):
+        if m.weights[k] > DEAD and k != best:
+            alike = 0.0
+            for i in range(9):
+                alike += m.estimates[k, i] * m.estimates[best, i]
+            if m.weights[k] < highest + _GIVEN_UP or alike > _ALIKE_COS:
+                m.weights[k] = DEAD
+        if m.weights[k] > DEAD:
+            left += 1
+            m.weights[k] -= highest
+    return best, left

@@ -1,0 +1,231 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the Sun filter knows of its spacecraft, and what it takes its errors to be."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.conversions import square
+from css_common.declared import computed, given, made, merged, part, table_of
+from css_common.schema import Values, choice, flag, real, reals
+from css_common.vectors import Mat3, mat3
+from css_environment.albedo import Screen, plane_screen
+from css_estimation.sun import flight_sky
+from css_estimation.sun.eclipse_detector import EclipseParameters
+from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
+
+CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
+"""One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
+output in the dark [-]."""
+
+WHEEL = np.dtype([(name, np.float64) for name in ("hx", "hy", "hz")], align=True)
+"""One reaction wheel: spin axis times spin inertia [kg m2]."""
+
+_IN_PLANE = 1e-9
+
+GAINS = reals("calibration.gains", (), "-", "output of each cell relative to the nominal; empty: all 1")
+DARKS = reals("calibration.darks", (), "-", "output of each cell in the dark; empty: all 0")
+NORMALS = reals("calibration.normals", (), "-", "measured normals of the cells, empty: those of the layout", columns=3)
+
+_CURVES = {"cosine": 0, "okeefe": 1, "table": 2}
+CURVE = choice(
+    "response.curve", "cosine", tuple(_CURVES), "output over light: proportional, O'Keefe & Schaub's Eq. 16, a table"
+)
+TABLE = reals("response.table", (), "-", "outputs at light 0, ..., 1 in equal steps, for the curve `table`")
+
+USE_WHEELS = flag("use_wheels", True, "without gyro, take the rate from angular momentum and wheel speeds")
+
+
+def _cells(values: Values) -> np.ndarray:
+    """(N,) of CELL."""
+    nominal = np.asarray(values.cells.normals, dtype=np.float64).reshape(-1, 3)
+    clip_normal = np.asarray(values.cells.clip_normal, dtype=np.float64)
+    cells = np.zeros(len(nominal), CELL)
+    measured = np.asarray(values[NORMALS], dtype=np.float64).reshape(-1, 3) if len(values[NORMALS]) else nominal
+    cells["nx"], cells["ny"], cells["nz"] = (measured / np.linalg.norm(measured, axis=1, keepdims=True)).T
+    # what hides the sky is structure: it follows the layout, not a cell's tilt
+    cells["side"] = nominal @ clip_normal
+    cells["side"][np.abs(cells["side"]) < _IN_PLANE] = 0.0
+    cells["gain"] = values[GAINS] if len(values[GAINS]) else 1.0
+    cells["dark"] = values[DARKS] if len(values[DARKS]) else 0.0
+    return cells
+
+
+def _screen(values: Values) -> Screen:
+    return plane_screen(values.cells.clip_normal)
+
+
+def _cos_half_view(values: Values) -> float:
+    return math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
+
+
+def _table(values: Values) -> np.ndarray:
+    return np.asarray(values[TABLE], dtype=np.float64)
+
+
+def _wheels(values: Values) -> np.ndarray:
+    axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
+    wheels = np.zeros(len(axes), WHEEL)
+    wheels["hx"], wheels["hy"], wheels["hz"] = values.wheels.inertia * axes.T
+    return wheels
+
+
+def _has_wheels(values: Values) -> bool:
+    return bool(values.wheels.fitted and len(values.wheels.axes))
+
+
+def _knows_momentum(values: Values) -> bool:
+    return bool(values[USE_WHEELS] and len(values.spacecraft.inertia))
+
+
+def _inertia(values: Values) -> Mat3:
+    """With the wheels' spin inertia along their axes, which the section leaves out; the identity when it is unknown."""
+    if not len(values.spacecraft.inertia):
+        return mat3(np.eye(3))
+    axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
+    body = np.asarray(values.spacecraft.inertia, dtype=np.float64).reshape(3, 3)
+    return mat3(body + (values.wheels.inertia * axes.T @ axes if values.wheels.fitted else 0.0))
+
+
+def _inverse_inertia(values: Values) -> Mat3:
+    return mat3(np.linalg.inv(np.array(_inertia(values))))
+
+
+class Response(NamedTuple):
+    """Output of a cell over the light that it receives."""
+
+    curve: int = made(_CURVES.__getitem__, CURVE)
+    table: np.ndarray = computed(_table, TABLE)
+    scale: float = given(
+        real("response.scale", 1.0, "-", "mean output of all cells at full light", low=0.01, high=10.0)
+    )
+
+
+class CellErrors(NamedTuple):
+    """Variances of what the model of the cells leaves out."""
+
+    noise: float = made(square, real("noise", 0.006, "-", "white noise of a cell, 1 sigma", low=1e-6, high=1.0))
+    common: float = made(
+        square, real("common_noise", 0.005, "-", "white error of the output common to all cells, 1 sigma", high=1.0)
+    )
+    scale: float = made(
+        square, real("scale_sigma", 0.02, "-", "slow error of the output common to all cells, 1 sigma", high=1.0)
+    )
+    scale_time: float = given(
+        real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9)
+    )
+    gain: float = made(
+        square, real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", high=1.0)
+    )
+    tilt: float = made(
+        lambda degrees: math.radians(degrees) ** 2,
+        real("tilt_sigma_deg", 0.1, "deg", "lasting error of each cell's normal about an axis, 1 sigma", high=45.0),
+    )
+
+
+class EarthErrors(NamedTuple):
+    """How the real Earth differs from the mean one."""
+
+    scale: float = made(
+        square, real("albedo.scale_sigma", 0.5, "-", "error of all reflectivities in common, 1 sigma", high=10.0)
+    )
+    scale_time: float = given(real("albedo.scale_time", 2000.0, "s", "correlation time of it", low=1.0, high=1e9))
+    clouds: float = given(
+        real("albedo.cloud_sigma", 0.5, "-", "error of the light on a single cell, 1 sigma of it", low=0.0, high=10.0)
+    )
+    clouds_time: float = given(real("albedo.cloud_time", 100.0, "s", "correlation time of it", low=1.0, high=1e9))
+    unknown: float = given(
+        real("albedo.unknown", 0.1, "-", "light of an Earth that is not predicted, on one cell", low=0.0, high=1.0)
+    )
+    largest: float = given(
+        real("albedo.largest", 0.3, "-", "light beyond the predicted that no Earth throws on a cell", low=0.01, high=2.0)
+    )
+    unknown_heading: float = made(
+        lambda degrees: math.radians(degrees) ** 2,
+        real(
+            "albedo.unknown_heading_deg",
+            1.5,
+            "deg",
+            "error of the heading by an Earth that is not predicted, per axis",
+            low=0.0,
+            high=45.0,
+        ),
+    )
+
+
+class Motion(NamedTuple):
+    """How the body turns, without gyro and with one."""
+
+    inertia: Mat3 = computed(_inertia)  # [kg m2]
+    inverse_inertia: Mat3 = computed(_inverse_inertia)
+    wheels: np.ndarray = computed(_wheels)  # (N,) of WHEEL
+    has_wheels: bool = computed(_has_wheels)
+    knows_momentum: bool = computed(_knows_momentum, USE_WHEELS)
+    use_gyro: bool = given(USE_GYRO)
+    gyro_limit: float = made(math.radians, GYRO_LIMIT)
+    cutoff: float = given(RATE_CUTOFF)
+    gyro_noise: float = made(  # [rad2/s2]
+        lambda rate: math.radians(rate) ** 2,
+        real("gyro.noise_deg_s", 0.01, "deg/s", "white noise of a gyro sample, 1 sigma", low=0.0, high=10.0),
+    )
+    gyro_bias: float = made(  # [rad2/s2]
+        lambda rate: math.radians(rate / 3600.0) ** 2,
+        real("gyro.bias_deg_h", 1.0, "deg/h", "bias of the gyro, 1 sigma", low=0.0, high=1e5),
+    )
+    start_rate: float = made(  # [rad2/s2]
+        lambda rate: math.radians(rate) ** 2,
+        real("rate.start_deg_s", 2.0, "deg/s", "rate of a body that nothing is known of, 1 sigma", high=100.0),
+    )
+    torque: float = made(  # [(N m)2 s]
+        lambda torque, time: torque * torque * time,
+        real("rate.torque", 1e-6, "N m", "unknown torque on the body, 1 sigma", low=0.0, high=100.0),
+        real("rate.torque_time", 2000.0, "s", "correlation time of it", low=0.0, high=1e9),
+    )
+    acceleration: float = made(  # [rad2/s3]
+        lambda rate: math.radians(rate) ** 2,
+        real(
+            "rate.walk_deg_s",
+            0.1,
+            "deg/s",
+            "change of the rate within a second where neither gyro nor momentum tells it, 1 sigma",
+            high=100.0,
+        ),
+    )
+
+
+class Convergence(NamedTuple):
+    """When which step of finding Sun and roll is taken."""
+
+    minimum_output: float = given(
+        real("minimum_output", 0.3, "-", "no Sun unless a cell is above it", low=0.01, high=1.0)
+    )
+    search_variance: float = made(
+        lambda degrees: math.radians(degrees) ** 2,
+        real("search.until_deg", 20.0, "deg", "spread at which the search for the Sun ends, 1 sigma", low=1.0, high=60.0),
+    )
+    roll_variance: float = made(
+        lambda degrees: math.radians(degrees) ** 2,
+        real("roll.from_deg", 4.0, "deg", "error of the heading at which roll is looked for, 1 sigma", low=0.1, high=45.0),
+    )
+    longest_step: float = given(
+        real("longest_step", 10.0, "s", "after a longer step the Sun is looked for anew", low=0.0, open_low=True, high=1e6)
+    )
+    gate: float = given(real("gate", 25.0, "-", "normalised innovation squared beyond which a cell is refused", low=1.0, high=1e6))
+
+
+class SunFilterParameters(NamedTuple):
+    """All of the estimator."""
+
+    cells: np.ndarray = computed(_cells, GAINS, DARKS, NORMALS)
+    screen: Screen = computed(_screen)
+    cos_half_view: float = computed(_cos_half_view)
+    response: Response = part(Response)
+    errors: CellErrors = part(CellErrors)
+    earth: EarthErrors = part(EarthErrors)
+    motion: Motion = part(Motion)
+    convergence: Convergence = part(Convergence)
+    eclipse: EclipseParameters = part(EclipseParameters)
+
+
+PARAMETERS = merged(table_of(SunFilterParameters), flight_sky.PARAMETERS)

@@ -1,0 +1,438 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A Sun filter for any layout of cells, that knows the Earth where it knows its place, with gyro, wheels or neither.
+
+One state: attitude, rate, intensity, the cells' lasting errors, and how the Earth differs from its mean (`memory`). The
+heading is the Sun's known direction in n, seen from that attitude; without an orbit model n is a frame of the filter's
+own. What the cells say is in `cell_update`, how the body turns in `motion`.
+
+Modes: 0 waiting for light, 1 looking for the Sun over the whole sphere (`sun_search`), 2 converging, the Earth being
+unknown, 3 following several turns about the Sun line (`hypotheses`), 4 tracking with the Earth's light predicted,
+5 tracking without, 6 no use made of the cells: dark, penumbra, or outputs that fade together; the state goes on by its
+rate. An estimate that can be no longer trusted (most outputs refused, and another direction explains them better; an
+error larger than a radian; a step longer than `longest_step`) is dropped and the Sun looked for anew.
+
+The covariance is that of the filter. While the Earth is unknown its light biases all cells for minutes, which no white
+noise describes: `albedo.unknown_heading_deg` is added then.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.attitude import rotation_vector_to_dcm
+from css_common.declared import builder
+from css_common.kernel import kernel
+from css_common.matrices import IDENTITY, skew
+from css_common.schema import Values
+from css_common.vectors import Vec3, matmul, multiply, scale, transpose, unit
+from css_estimation.sun import eclipse_detector
+from css_estimation.sun.eclipse_detector import EclipseState, detect_eclipse
+from css_estimation.sun.low_pass import low_pass, low_pass_gain
+from css_estimation.sun.sun_heading import (
+    NO_COVARIANCE,
+    RATE_GYRO,
+    RATE_MOMENTUM,
+    RATE_NONE,
+    RATE_SUN,
+    VALIDITY_HELD,
+    VALIDITY_NONE,
+    VALIDITY_VALID,
+    Aiding,
+    Covariance,
+    SunHeading,
+)
+from css_estimation.sun.sun_tracking import elapsed
+from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
+from css_estimation.sun_filter.fading import fading
+from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen_roll, weigh
+from css_estimation.sun_filter.memory import (
+    DEAD,
+    DIRECTIONS,
+    EARTH,
+    GAIN,
+    HYPOTHESES,
+    SCALE,
+    THETA,
+    X_EARTH,
+    X_GAIN,
+    X_SCALE,
+    SunFilterMemory,
+    dcm_of,
+    new_memory,
+    set_dcm,
+    triple,
+)
+from css_estimation.sun_filter.motion import (
+    RATE_BY_GYRO,
+    RATE_BY_MOMENTUM,
+    RATE_BY_WALK,
+    change_rate,
+    fade,
+    go_on,
+    gyro_usable,
+    rate_model,
+    wheel_momentum,
+)
+from css_estimation.sun_filter.options import PARAMETERS, SunFilterParameters
+from css_estimation.sun_filter.sun_search import cost, least_cost, search
+
+MODE_WAITING = 0
+MODE_SEARCHING = 1
+MODE_CONVERGING = 2
+MODE_ROLLS = 3
+MODE_EARTH = 4
+MODE_NO_EARTH = 5
+MODE_COASTING = 6
+
+_STAGE_SEARCH, _STAGE_HEADING, _STAGE_ROLL = 0, 1, 2
+
+_SHORTEST_SEARCH = 0.95  # [s]
+_SHORTEST_CONVERGENCE = 3.0  # [s]
+_CONTRARY_TIME = 5.0  # [s]
+_CONTRARY_SHARE = 0.4
+# Another direction has to explain the outputs better by this much before the estimate is given up for it.
+_BETTER = 6.0
+_LOST = 1.0  # [rad] error of the heading beyond which there is no estimate
+_FULL_DISC = 0.99
+_CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told to fade
+_MOST = 4.0  # [rad2] reported variance
+_NO_RATE: Vec3 = (0.0, 0.0, 0.0)
+
+parameters = builder(SunFilterParameters)
+
+
+class Progress(NamedTuple):
+    """How far the filter has come."""
+
+    stage: int  # _STAGE_*
+    begun: bool  # light has been seen since the search began
+    since: float  # [s] of light in this stage
+    contrary: float  # share of late cycles that contradict the estimate
+    faded: float  # [s] how long outputs have been too low
+
+
+class Rate(NamedTuple):
+    """How the body turns."""
+
+    model: int  # RATE_BY_*
+    raw_b: Vec3  # [rad/s] in the last cycle
+    omega_bn_b: Vec3  # [rad/s] as reported
+
+
+class Found(NamedTuple):
+    """The Sun by the search alone."""
+
+    sun_b: Vec3
+    variance: float  # [rad2] on the worst axis
+
+
+class SunFilterState(NamedTuple):
+    """Carried from cycle to cycle beside the memory."""
+
+    progress: Progress
+    rate: Rate
+    found: Found
+    validity: int
+    age: float  # [s]
+    eclipse: EclipseState
+
+
+class Cycle(NamedTuple):
+    """What both ways of going on are given."""
+
+    dt: float  # [s]
+    flux: float  # [-] of the Sun
+    lit: bool  # cells may be used
+    model: int  # RATE_BY_* of this cycle
+    wheels_b: Vec3  # [N m s]
+    largest: float  # brightest output [-]
+
+
+_AFRESH = Progress(_STAGE_SEARCH, False, 0.0, 0.0, 0.0)
+_NOT_FOUND = Found((0.0, 0.0, 1.0), math.pi)
+
+
+def initial_state(p: SunFilterParameters) -> SunFilterState:
+    """Nothing known."""
+    rate = Rate(RATE_BY_WALK, _NO_RATE, _NO_RATE)
+    return SunFilterState(_AFRESH, rate, _NOT_FOUND, VALIDITY_NONE, 0.0, eclipse_detector.initial_state())
+
+
+def initial_memory(p: SunFilterParameters) -> SunFilterMemory:
+    """Room for all hypotheses."""
+    return new_memory(len(p.cells))
+
+
+def heading_gain(values: Values) -> float:
+    """Steady gain across the Sun line: the heading follows the rate, and cells correct it within seconds."""
+    return 0.05
+
+
+@kernel
+def bit_count(mask: int) -> int:
+    """Bits that are set."""
+    count = 0
+    while mask:
+        mask &= mask - 1
+        count += 1
+    return count
+
+
+@kernel
+def _brightest(p: SunFilterParameters, voltages) -> float:
+    """Largest readable output as calibrated [-]; 0 when none is above that."""
+    largest = 0.0
+    for i in range(voltages.shape[0]):
+        # a NaN compares false
+        if abs(voltages[i]) < READABLE:
+            largest = max(largest, (voltages[i] - p.cells[i].dark) / max(p.cells[i].gain, 0.01))
+    return largest
+
+
+@kernel
+def _sunlight(p: SunFilterParameters, aiding: Aiding, largest: float) -> tuple[float, bool]:
+    """Sunlight to reckon with, 1 at 1 AU, and whether cells may be used: lit, and the whole disc in view."""
+    lit = largest > p.convergence.minimum_output
+    sky = aiding.sky
+    if not sky.known:
+        return 1.0, lit
+    # where the model says night and cells say bright day, the model is wrong
+    bright_night = sky.illumination <= 0.0 and largest > 2.0 * p.convergence.minimum_output
+    return sky.solar_flux, lit and (sky.illumination > _FULL_DISC or bright_night)
+
+
+@kernel
+def _filtered_rate(p: SunFilterParameters, rate: Rate, cycle: Cycle, raw_b: Vec3) -> Rate:
+    """The rate as reported: a gyro's through the low-pass filter, another as it is, since the filter has smoothed it."""
+    omega_bn_b = raw_b
+    if cycle.model == RATE_BY_GYRO:
+        omega_bn_b = low_pass(rate.omega_bn_b, raw_b, low_pass_gain(p.motion.cutoff, cycle.dt))
+    return Rate(cycle.model, raw_b, omega_bn_b)
+
+
+@kernel
+def _across(sun: Vec3, variance: float) -> Covariance:
+    """Equal variance on both axes across the Sun line, row-major."""
+    x, y, z = sun
+    return (
+        variance * (1.0 - x * x), -variance * x * y, -variance * x * z,
+        -variance * x * y, variance * (1.0 - y * y), -variance * y * z,
+        -variance * x * z, -variance * y * z, variance * (1.0 - z * z),
+    )  # fmt: skip
+
+
+@kernel
+def _reported(p: SunFilterParameters, x, covariance, sun_n: Vec3, earth_known: bool) -> Covariance:
+    """Covariance of the heading in b, row-major."""
+    # ds_b = dcm_bn (s x theta)
+    turn = matmul(dcm_of(x), skew(sun_n))
+    theta = triple(covariance[THETA], THETA), triple(covariance[THETA + 1], THETA), triple(covariance[THETA + 2], THETA)
+    c = matmul(matmul(turn, theta), transpose(turn))
+    systematic = _across(multiply(dcm_of(x), sun_n), 0.0 if earth_known else p.earth.unknown_heading)
+    xx, yy, zz = min(c[0][0], _MOST), min(c[1][1], _MOST), min(c[2][2], _MOST)
+    xy, xz, yz = 0.5 * (c[0][1] + c[1][0]), 0.5 * (c[0][2] + c[2][0]), 0.5 * (c[1][2] + c[2][1])
+    return (
+        xx + systematic[0], xy + systematic[1], xz + systematic[2],
+        xy + systematic[1], yy + systematic[4], yz + systematic[5],
+        xz + systematic[2], yz + systematic[5], zz + systematic[8],
+    )  # fmt: skip
+
+
+@kernel
+def _search(
+    p: SunFilterParameters, state: SunFilterState, memory: SunFilterMemory, cycle: Cycle, voltages, aiding: Aiding
+) -> tuple[Progress, Rate, Found]:
+    """A cycle without an estimate; the attitude of the first hypothesis is the frame in which directions are fixed."""
+    before = state.progress
+    x = memory.estimates[0]
+    begun, since = before.begun, before.since
+    raw_b = aiding.gyro_b if cycle.model == RATE_BY_GYRO else _NO_RATE
+    found = state.found
+    if begun:
+        turn = rotation_vector_to_dcm(scale(cycle.dt, raw_b))
+        set_dcm(x, matmul(turn, dcm_of(x)))
+        found = Found(unit(multiply(turn, found.sun_b)), found.variance)
+    stage = _STAGE_SEARCH
+    if cycle.lit:
+        if not begun:
+            set_dcm(x, IDENTITY)
+            for g in range(DIRECTIONS):
+                memory.grid[g] = 0.0
+            begun, since = True, 0.0
+        since += cycle.dt
+        turns = cycle.model == RATE_BY_GYRO
+        mean_n, variance = search(p, memory.grid, dcm_of(x), voltages, cycle.flux, cycle.dt, turns)
+        found = Found(multiply(dcm_of(x), mean_n), variance)
+        if since > _SHORTEST_SEARCH and variance < p.convergence.search_variance:
+            begin(p, memory, found.sun_b, variance, aiding.sky.sun_n, cycle.model, cycle.wheels_b)
+            stage, since = _STAGE_HEADING, 0.0
+    return Progress(stage, begun, since, 0.0, 0.0), _filtered_rate(p, state.rate, cycle, raw_b), found
+
+
+@kernel
+def _forget_slowly(p: SunFilterParameters, dt: float, states: int, x, covariance) -> None:
+    """Errors of outputs and Earth go on."""
+    cells = p.cells.shape[0]
+    fade(SCALE, X_SCALE, 1, p.errors.scale_time, p.errors.scale, dt, states, x, covariance)
+    if states > GAIN + cells:
+        fade(EARTH, X_EARTH, 1, p.earth.scale_time, p.earth.scale, dt, states, x, covariance)
+        fade(GAIN + cells, X_GAIN + cells, cells, p.earth.clouds_time, 1.0, dt, states, x, covariance)
+
+
+@kernel
+def _lost(
+    p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3, flux: float, voltages
+) -> bool:
+    """Whether an estimate has to be dropped."""
+    if not sigma < _LOST:
+        return True
+    if contrary <= _CONTRARY_SHARE:
+        return False
+    here = cost(p, voltages, flux, multiply(dcm_of(x), sun_n))
+    return here - least_cost(p, voltages, flux) > _BETTER
+
+
+@kernel
+def _track(
+    p: SunFilterParameters, state: SunFilterState, memory: SunFilterMemory, cycle: Cycle, voltages, aiding: Aiding
+) -> tuple[Progress, Rate, CellReading, int, int]:
+    """A cycle with an estimate; gives too what the best hypothesis read, its number, and the mode."""
+    before = state.progress
+    sun_n, dt = aiding.sky.sun_n, cycle.dt
+    cells = p.cells.shape[0]
+    earth_known = before.stage == _STAGE_ROLL
+    states = GAIN + (2 * cells if earth_known else cells)
+    faded, use = before.faded, cycle.lit
+    best, left = 0, 1
+    reading, raw_b = NOTHING_READ, _NO_RATE
+    for k in range(HYPOTHESES):
+        if memory.weights[k] <= DEAD:
+            continue
+        x, covariance = memory.estimates[k], memory.covariances[k]
+        if cycle.model != state.rate.model:
+            change_rate(p.motion, state.rate.model, cycle.model, state.rate.raw_b, cycle.wheels_b, x, covariance)
+        omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, dt, states, x, covariance)
+        _forget_slowly(p, dt, states, x, covariance)
+        if k == 0 or memory.weights[k] > memory.weights[best]:
+            best, raw_b = k, omega_b
+    best_x, best_covariance = memory.estimates[best], memory.covariances[best]
+    if use and heading_sigma(best_covariance, sun_n) < _CONVERGED:
+        faded = fading(p, best_x, best_covariance, sun_n, cycle.flux, voltages, faded, dt)
+        use = faded == 0.0
+    if use:
+        for k in range(HYPOTHESES):
+            if memory.weights[k] <= DEAD:
+                continue
+            x, covariance = memory.estimates[k], memory.covariances[k]
+            if earth_known:
+                loosen_roll(covariance, sun_n, before.since, dt)
+            read = read_cells(
+                p, voltages, sun_n, cycle.flux, earth_known, aiding.sky.light, states, x, covariance, memory.earth,
+                memory.work,
+            )  # fmt: skip
+            weigh(memory, k, read.likelihood)
+            if k == best:
+                reading = read
+        best, left = give_up(memory)
+    progress, mode = _progress(p, before, memory, best, left, cycle, use, faded, reading, voltages, aiding)
+    return progress, _filtered_rate(p, state.rate, cycle, raw_b), reading, best, mode
+
+
+@kernel
+def _progress(
+    p: SunFilterParameters,
+    before: Progress,
+    memory: SunFilterMemory,
+    best: int,
+    left: int,
+    cycle: Cycle,
+    use: bool,
+    faded: float,
+    reading: CellReading,
+    voltages,
+    aiding: Aiding,
+) -> tuple[Progress, int]:
+    """Which stage comes next, and the mode of this cycle."""
+    stage, since, contrary = before.stage, before.since, before.contrary
+    x, covariance = memory.estimates[best], memory.covariances[best]
+    sun_n = aiding.sky.sun_n
+    sigma = heading_sigma(covariance, sun_n)
+    mode = MODE_COASTING
+    if use:
+        since += cycle.dt
+        mode = MODE_EARTH if left == 1 else MODE_ROLLS
+        if stage == _STAGE_HEADING:
+            mode = MODE_CONVERGING if aiding.sky.known or sigma > _CONVERGED else MODE_NO_EARTH
+        refused = bit_count(reading.refused)
+        if refused + reading.nis_dof > 0:
+            share = 1.0 if reading.contrary > 0 else refused / (refused + reading.nis_dof)
+            contrary += (share - contrary) * min(1.0, cycle.dt / _CONTRARY_TIME)
+    if _lost(p, contrary, sigma, x, sun_n, cycle.flux, voltages):
+        return _AFRESH, mode
+    if contrary > _CONTRARY_SHARE:
+        contrary = 0.0
+    converged = stage == _STAGE_HEADING and since > _SHORTEST_CONVERGENCE
+    if use and aiding.sky.known and converged and sigma * sigma < p.convergence.roll_variance:
+        look_for_roll(p, memory, sun_n)
+        stage, since = _STAGE_ROLL, 0.0
+    return Progress(stage, True, since, contrary, faded), mode
+
+
+@kernel
+def step(
+    p: SunFilterParameters,
+    state: SunFilterState,
+    memory: SunFilterMemory,
+    dt: float,
+    voltages,
+    aiding: Aiding,
+) -> tuple[SunFilterState, SunHeading]:
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
+    dt = elapsed(dt)
+    largest = _brightest(p, voltages)
+    flux, lit = _sunlight(p, aiding, largest)
+    eclipse_state, eclipse = detect_eclipse(p.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
+    wheels_b, wheels_ok = wheel_momentum(p.motion, aiding)
+    cycle = Cycle(dt, flux, lit, rate_model(p.motion, gyro_usable(p.motion, aiding), wheels_ok), wheels_b, largest)
+    reading, found = NOTHING_READ, state.found
+    if state.progress.stage == _STAGE_SEARCH or dt > p.convergence.longest_step:
+        if state.progress.stage != _STAGE_SEARCH:
+            state = SunFilterState(_AFRESH, state.rate, _NOT_FOUND, state.validity, state.age, state.eclipse)
+        progress, rate, found = _search(p, state, memory, cycle, voltages, aiding)
+        sun_b, covariance = found.sun_b, _across(found.sun_b, min(found.variance, _MOST))
+        mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
+        rate_source = RATE_GYRO if cycle.model == RATE_BY_GYRO else RATE_NONE
+    else:
+        progress, rate, reading, best, mode = _track(p, state, memory, cycle, voltages, aiding)
+        x = memory.estimates[best]
+        sun_b = unit(multiply(dcm_of(x), aiding.sky.sun_n))
+        earth_known = progress.stage == _STAGE_ROLL
+        covariance = _reported(p, x, memory.covariances[best], aiding.sky.sun_n, earth_known)
+        used = reading.nis_dof > 0
+        rate_source = RATE_SUN
+        if cycle.model == RATE_BY_GYRO:
+            rate_source = RATE_GYRO
+        elif cycle.model == RATE_BY_MOMENTUM:
+            rate_source = RATE_MOMENTUM
+        found = Found(sun_b, heading_sigma(memory.covariances[best], aiding.sky.sun_n) ** 2)
+    validity = state.validity
+    if used:
+        validity = VALIDITY_VALID
+    elif validity == VALIDITY_VALID:
+        validity = VALIDITY_HELD
+    age = 0.0 if used or validity == VALIDITY_NONE else state.age + dt
+    if validity == VALIDITY_NONE:
+        sun_b, covariance = (0.0, 0.0, 0.0), NO_COVARIANCE
+    heading = SunHeading(
+        sun_b,
+        covariance,
+        rate.omega_bn_b,
+        age,
+        reading.nis,
+        reading.nis_dof,
+        reading.used,
+        validity,
+        rate_source,
+        eclipse,
+        mode,
+    )
+    return SunFilterState(progress, rate, found, validity, age, eclipse_state), heading

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Where is the Sun? Weights of directions over the whole sphere, for a filter that has no estimate to begin with.
+
+They are weighed by what the cells read: one lit cell leaves a ring, several a spot. With a gyro weights gather while the
+body turns, in a frame that turns with it; without, they forget within a second. Mean and spread of them are an estimate
+too, the only one while the spread is large; once it is small the filter begins from it.
+"""
+
+import math
+
+from css_common.kernel import kernel
+from css_common.vectors import Mat3, Vec3, axes_across, dot, multiply, unit
+from css_estimation.sun_filter.cell_update import READABLE, view_of
+from css_estimation.sun_filter.memory import DIRECTIONS
+from css_estimation.sun_filter.options import SunFilterParameters
+
+# Golden angle [rad]: points turned by it from one circle to the next are spread evenly (Fibonacci lattice).
+_GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
+_MEMORY = 1.0  # [s]
+_MARGIN = 0.07  # in cosines, half of the way from one direction to the next
+_SIGMA = 0.1  # error of an output that model and Earth leave
+_MOST = 12.0  # cost of a single cell, so that a broken one does not decide
+_LEAST_GAIN = 0.2
+
+
+@kernel
+def direction(g: int) -> Vec3:
+    """Direction `g` of `DIRECTIONS`."""
+    z = 1.0 - 2.0 * (g + 0.5) / DIRECTIONS
+    r, a = math.sqrt(1.0 - z * z), _GOLDEN * g
+    return r * math.cos(a), r * math.sin(a), z
+
+
+@kernel
+def cost(p: SunFilterParameters, voltages, flux: float, sun_b: Vec3) -> float:
+    """How badly the Sun in a direction explains the outputs: half of the sum of their normalised squares."""
+    total = 0.0
+    mean_albedo = 0.5 * p.earth.unknown
+    for i in range(voltages.shape[0]):
+        if not abs(voltages[i]) < READABLE:
+            continue
+        cosine, seen, doubtful = view_of(p, i, sun_b, _MARGIN)
+        cell = p.cells[i]
+        v = (voltages[i] - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
+        dark = (v - mean_albedo) / _SIGMA
+        lit = (v - mean_albedo - flux * max(cosine, 0.0)) / _SIGMA
+        worst = lit * lit if seen else dark * dark
+        if doubtful:
+            worst = min(lit * lit, dark * dark)
+        total += min(0.5 * worst, _MOST)
+    return total
+
+
+@kernel
+def search(p: SunFilterParameters, grid, dcm_bn: Mat3, voltages, flux: float, dt: float, turns: bool) -> tuple[Vec3, float]:
+    """Adds a cycle's outputs to the weights; gives the mean direction, in n, and the variance about it on the worst axis.
+
+    Args:
+        grid: (DIRECTIONS,) logarithms, advanced.
+        dcm_bn: frame in which directions are fixed.
+        turns: it turns with the body, so that nothing need be forgotten.
+    """
+    kept = 1.0 if turns else math.exp(-dt / _MEMORY)
+    share = dt / _MEMORY if turns else 1.0 - kept
+    best = -math.inf
+    for g in range(DIRECTIONS):
+        grid[g] = kept * grid[g] - share * cost(p, voltages, flux, multiply(dcm_bn, direction(g)))
+        best = max(best, grid[g])
+    total = x = y = z = 0.0
+    for g in range(DIRECTIONS):
+        grid[g] -= best
+        weight = math.exp(grid[g])
+        d = direction(g)
+        total += weight
+        x += weight * d[0]
+        y += weight * d[1]
+        z += weight * d[2]
+    mean = unit((x, y, z))
+    first, second = axes_across(mean)
+    aa = ab = bb = 0.0
+    for g in range(DIRECTIONS):
+        weight = math.exp(grid[g]) / total
+        d = direction(g)
+        a, b = dot(d, first), dot(d, second)
+        across = math.sqrt(a * a + b * b)
+        if across > 0.0:
+            angle = math.atan2(across, dot(d, mean)) / across
+            a, b = a * angle, b * angle
+            aa += weight * a * a
+            ab += weight * a * b
+            bb += weight * b * b
+    return mean, 0.5 * (aa + bb) + math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
+
+
+@kernel
+def least_cost(p: SunFilterParameters, voltages, flux: float) -> float:
+    """Cost of the direction that explains the outputs best."""
+    least = math.inf
+    for g in range(DIRECTIONS):
+        least = min(least, cost(p, voltages, flux, direction(g)))
+    return least
