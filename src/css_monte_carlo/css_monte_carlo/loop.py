@@ -15,7 +15,7 @@ from css_common.kernel import kernel, outer_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply
 from css_environment.albedo_vector import PATCHES, point_source
-from css_estimation.sun.sun_heading import Aiding
+from css_estimation.sun.sun_heading import Aiding, Sky
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
@@ -164,18 +164,17 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         if read.field_valid:
             field_b, field_step = read.field_b, step
         wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
+        known, predicted, sun_n, solar_flux, illumination = sky_at(around.sky, k)
+        sky_light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
+        sky = Sky(known, predicted, sun_n, solar_flux, illumination, sky_light)
         field_is_new = v.heading_hears_field and read.field_valid
-        aiding = Aiding(
-            read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky_at(around, k)
-        )
+        aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
         heading_state, heading = estimate_heading(
             v.heading, heading_state, state.heading_memory, since_s, voltages, aiding
         )
         # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
         filtered_s = since_s if step > 0 else 0.0
-        aiding = Aiding(
-            read.gyro_b, read.gyro_valid, read.field_b, read.field_valid, speeds, False, sky_at(around, k)
-        )
+        aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid, speeds, False, sky)
         attitude_state, attitude = estimate_attitude(
             v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
         )

@@ -14,6 +14,7 @@ from css_common.epochs import parse_utc
 from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
 from css_environment import ephemeris
+from css_common.vectors import Vec3
 from css_environment.albedo_vector import PATCHES, earth_light_sources
 from css_environment.earth_light import EarthView, gather_light, look_at_earth, new_earth_view, new_light
 from css_environment.ephemeris import EnvironmentState, Ephemeris
@@ -21,7 +22,6 @@ from css_environment.mission_environment import MissionEnvironment
 from css_estimation.attitude.flight_references import FlightReferences, References
 from css_estimation.sun import flight_sky
 from css_estimation.sun.flight_sky import FlightSky
-from css_estimation.sun.sun_heading import Sky
 from css_sim.flight_environment import flight_environment
 
 BLOCK_STEPS = 1200
@@ -58,7 +58,7 @@ SKY = np.dtype(
     ],
     align=True,
 )
-"""`Sky` of one step, without the light of the Earth."""
+"""`css_estimation.sun.sun_heading.Sky` of one step, without the light of the Earth."""
 
 
 class Surroundings(NamedTuple):
@@ -102,12 +102,10 @@ def references_at(table, k: int) -> References:
 
 
 @kernel
-def sky_at(around: Surroundings, k: int) -> Sky:
-    """What the Sun estimator's models say at a step."""
-    s = around.sky[min(k, around.sky.shape[0] - 1)]
-    light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
-    sun_n = (s.sun_n[0], s.sun_n[1], s.sun_n[2])
-    return Sky(s.known, s.predicted, sun_n, s.solar_flux, s.illumination, light)
+def sky_at(table, k: int) -> tuple[bool, int, Vec3, float, float]:
+    """What the Sun estimator's models say at a step: all of a `Sky` but the light of the Earth."""
+    s = table[min(k, table.shape[0] - 1)]
+    return s.known, s.predicted, (s.sun_n[0], s.sun_n[1], s.sun_n[2]), s.solar_flux, s.illumination
 
 
 @outer_kernel

@@ -97,7 +97,18 @@ _CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told t
 _MOST = 4.0  # [rad2] reported variance
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
 
-parameters = builder(SunFilterParameters)
+_built = builder(SunFilterParameters)
+
+
+class SunFilter(SunFilterParameters):
+    """The parameters of this filter: by their type a study finds it."""
+
+    __slots__ = ()
+
+
+def parameters(values: Values) -> SunFilter:
+    """Parameters from checked values."""
+    return SunFilter(*_built(values))
 
 
 class Progress(NamedTuple):
