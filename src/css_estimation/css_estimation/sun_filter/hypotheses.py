@@ -31,13 +31,13 @@ from css_estimation.sun_filter.motion import begin_rate
 from css_estimation.sun_filter.options import SunFilterParameters
 
 # Outputs of one cycle to the next are alike in what the model has wrong: so much of each is news.
-_NEWS = 0.05
+_NEWS = 0.02
 # Logarithm of the weight, relative to the best, at which a hypothesis is given up.
 _GIVEN_UP = -12.0
 # Two hypotheses this near [rad] are one.
 _ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
 # Errors of a new hypothesis [rad2]: about the Sun line, and across it what the unknown Earth may have done.
-_ROLL_VARIANCE = 0.3**2
+_ROLL_VARIANCE = 0.2**2
 _HEADING_VARIANCE = 0.05**2
 _SEARCH_VARIANCE = 0.1**2
 # Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: its

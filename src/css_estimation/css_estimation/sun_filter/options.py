@@ -132,7 +132,7 @@ class EarthErrors(NamedTuple):
     )
     scale_time: float = given(real("albedo.scale_time", 2000.0, "s", "correlation time of it", low=1.0, high=1e9))
     clouds: float = given(
-        real("albedo.cloud_sigma", 0.5, "-", "error of the light on a single cell, 1 sigma of it", low=0.0, high=10.0)
+        real("albedo.cloud_sigma", 0.3, "-", "error of the light on a single cell, 1 sigma of it", low=0.0, high=10.0)
     )
     clouds_time: float = given(real("albedo.cloud_time", 100.0, "s", "correlation time of it", low=1.0, high=1e9))
     unknown: float = given(
@@ -148,6 +148,17 @@ class EarthErrors(NamedTuple):
             1.5,
             "deg",
             "error of the heading by an Earth that is not predicted, per axis",
+            low=0.0,
+            high=45.0,
+        ),
+    )
+    clouded_heading: float = made(
+        lambda degrees: math.radians(degrees) ** 2,
+        real(
+            "albedo.clouded_heading_deg",
+            0.1,
+            "deg",
+            "error of the heading by clouds that last, beyond what the states of the Earth hold, per axis",
             low=0.0,
             high=45.0,
         ),

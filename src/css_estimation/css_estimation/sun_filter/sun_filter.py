@@ -11,8 +11,8 @@ unknown, 3 following several turns about the Sun line (`hypotheses`), 4 tracking
 rate. An estimate that can be no longer trusted (most outputs refused, and another direction explains them better; an
 error larger than a radian; a step longer than `longest_step`) is dropped and the Sun looked for anew.
 
-The covariance is that of the filter. While the Earth is unknown its light biases all cells for minutes, which no white
-noise describes: `albedo.unknown_heading_deg` is added then.
+The covariance is that of the filter and of what lasts too long to be noise: while the Earth is unknown its light
+(`albedo.unknown_heading_deg`), later its clouds (`albedo.clouded_heading_deg`).
 """
 
 import math
@@ -238,7 +238,8 @@ def _reported(p: SunFilterParameters, x, covariance, sun_n: Vec3, earth_known: b
     turn = matmul(dcm_of(x), skew(sun_n))
     theta = triple(covariance[THETA], THETA), triple(covariance[THETA + 1], THETA), triple(covariance[THETA + 2], THETA)
     c = matmul(matmul(turn, theta), transpose(turn))
-    systematic = _across(multiply(dcm_of(x), sun_n), 0.0 if earth_known else p.earth.unknown_heading)
+    lasting = p.earth.clouded_heading if earth_known else p.earth.unknown_heading
+    systematic = _across(multiply(dcm_of(x), sun_n), lasting)
     xx, yy, zz = min(c[0][0], _MOST), min(c[1][1], _MOST), min(c[2][2], _MOST)
     xy, xz, yz = 0.5 * (c[0][1] + c[1][0]), 0.5 * (c[0][2] + c[2][0]), 0.5 * (c[1][2] + c[2][1])
     return (
