@@ -24,6 +24,7 @@ from css_sim.disturbances import Disturbances
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
 from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
 from css_sim.spacecraft import Spacecraft, advance
+from sunpoint_control.held_field import HeldField
 
 
 class Vehicle(NamedTuple):
@@ -174,9 +175,8 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
         # as the control node has it: the last measurement, for as long as the next may be on its way
         field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
-        control_state = command(
-            v.control, control_state, since_s, heading, speeds, field_b, field_valid, torque, dipole
-        )
+        held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
+        control_state = command(v.control, control_state, since_s, heading, speeds, held, torque, dipole)
         momentum_b = sum_along_axes(craft.body.wheels, momentum)
         truth = Truth(rotation.sigma_bn, rotation.omega_bn_b, sun_b, v.array_normal_b, momentum_b, read.gyro_bias_b)
         tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)

@@ -14,6 +14,8 @@ from css_common.kernel import kernel
 from css_common.schema import Values, choice
 from css_common.vectors import Vec3, norm
 from sunpoint_control import modes
+from sunpoint_control.control_output import LARGEST_DIRECTION, LARGEST_FIELD, LARGEST_RATE, ControlOutput, within
+from sunpoint_control.held_field import HeldField
 from sunpoint_control.modes import (
     MODE_DETUMBLE,
     MODE_ECLIPSE,
@@ -43,11 +45,7 @@ _ECLIPSE = {"coast": 0, "rate_damp": 1, "hold_attitude": 2}
 _COAST = _ECLIPSE["coast"]
 _HOLD = _ECLIPSE["hold_attitude"]
 
-# Beyond these an input is a fault, not a measurement.
-_LARGEST_DIRECTION = 2.0
-_LARGEST_RATE = 100.0  # [rad/s]
-_LARGEST_SPEED = 1e6  # [rad/s]
-_LARGEST_FIELD = 1.0  # [T]
+_LARGEST_SPEED = 1e6  # [rad/s] beyond it a reading is a fault
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
@@ -82,22 +80,6 @@ class ControlState(NamedTuple):
     modes: ModeState
 
 
-class ControlOutput(NamedTuple):
-    """What one cycle decided; see css_msgs/ControlStatus."""
-
-    torque_b: Vec3  # [N m] asked of the wheels, on the body
-    integral: Vec3  # [N m s] z of the control law
-    wheel_momentum_b: Vec3  # [N m s]
-    pointing_error: float  # [rad] -1: no Sun known
-    rate: float  # [rad/s]
-    mode: int
-    reason: int
-    deadband: bool
-    dumping: bool
-    wheels_saturated: int  # bit i: wheel i was asked for more than it may give
-    rods_saturated: int  # bit i: rod i was asked for more than it may give
-
-
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between parameters, one message each."""
     yield from modes.conflicts(values)
@@ -116,20 +98,6 @@ def initial_state(p: ControlParameters) -> ControlState:
     return ControlState(_ZERO, modes.initial_state())
 
 
-def at_rest(mode: int, reason: int) -> ControlOutput:
-    """Output of a control that does nothing: no torque, nothing known."""
-    return ControlOutput(_ZERO, _ZERO, _ZERO, -1.0, 0.0, mode, reason, False, False, 0, 0)
-
-
-@kernel
-def _within(values, limit: float) -> bool:
-    # a NaN compares false
-    for value in values:  # noqa: SIM110  (a generator expression does not compile)
-        if not abs(value) <= limit:
-            return False
-    return True
-
-
 @kernel
 def step(
     p: ControlParameters,
@@ -141,8 +109,7 @@ def step(
     omega_bn_b: Vec3,
     rate_source: int,
     wheel_speeds,
-    field_b: Vec3,
-    field_valid: bool,
+    field: HeldField,
     torque_out,
     dipole_out,
 ) -> tuple[ControlState, ControlOutput]:
@@ -152,15 +119,13 @@ def step(
         dt: time since the last cycle [s].
         sun_b, validity, eclipse, omega_bn_b, rate_source: fields of the Sun estimate.
         wheel_speeds: (n,) relative to the body [rad/s].
-        field_b, field_valid: magnetic field [T], and whether there is a measurement.
+        field: the measured magnetic field.
         torque_out: (n,) motor torques [N m], written.
         dipole_out: (m,) rod dipoles [A m^2], written; may be empty without rods.
     """
     dt = dt if 0.0 < dt < math.inf else 0.0
     inputs_ok = (
-        _within(sun_b, _LARGEST_DIRECTION)
-        and _within(omega_bn_b, _LARGEST_RATE)
-        and _within(wheel_speeds, _LARGEST_SPEED)
+        within(sun_b, LARGEST_DIRECTION) and within(omega_bn_b, LARGEST_RATE) and within(wheel_speeds, _LARGEST_SPEED)
     )
     sigma_br = _ZERO
     error = -1.0
@@ -217,8 +182,10 @@ def step(
     dumping = False
     dipole_out[:] = 0.0
     allowed = mode == MODE_ECLIPSE or (mode != MODE_SAFE and not p.dumping.in_eclipse_only)
-    if p.dumping.enabled and allowed and field_valid and inputs_ok and _within(field_b, _LARGEST_FIELD):
-        rods_saturated, dumping = add_dumping(p.dumping, p.allocation, wheel_speeds, field_b, torque_out, dipole_out)
+    if p.dumping.enabled and allowed and field.valid and inputs_ok and within(field.field_b, LARGEST_FIELD):
+        rods_saturated, dumping = add_dumping(
+            p.dumping, p.allocation, wheel_speeds, field.field_b, torque_out, dipole_out
+        )
     output = ControlOutput(
         torque_b,
         z,

@@ -9,7 +9,8 @@ from okeefe_spacecraft import okeefe_values
 
 from css_common.sections import RODS, WHEELS
 from sunpoint_control import momentum_dumping, wheel_allocation
-from sunpoint_control.momentum_dumping import add_dumping, rod_dipoles, rod_torque
+from sunpoint_control.momentum_dumping import add_dumping
+from sunpoint_control.torque_rods import rod_dipoles, rod_torque
 
 AXES = np.asarray(okeefe_values(WHEELS).wheels.axes)
 component = st.floats(-1.0, 1.0)
@@ -26,7 +27,7 @@ def parameters(**changes):
 
 
 def dump(p, wheels, speeds, field_b, torques=(0.0, 0.0, 0.0, 0.0)):
-    torques, dipoles = np.array(torques), np.full(len(p.rod_axes_b), np.nan)
+    torques, dipoles = np.array(torques), np.full(len(p.rods.axes_b), np.nan)
     result = add_dumping(p, wheels, np.array(speeds), field_b, torques, dipoles)
     return torques, dipoles, result
 
