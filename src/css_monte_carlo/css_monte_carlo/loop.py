@@ -178,13 +178,30 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
         control_state = command(v.control, control_state, since_s, heading, speeds, held, torque, dipole)
         momentum_b = sum_along_axes(craft.body.wheels, momentum)
-        truth = Truth(rotation.sigma_bn, rotation.omega_bn_b, sun_b, v.array_normal_b, momentum_b, read.gyro_bias_b)
+        truth = Truth(
+            rotation.sigma_bn,
+            rotation.omega_bn_b,
+            sun_b,
+            v.array_normal_b,
+            momentum_b,
+            read.gyro_bias_b,
+            sum_of_sizes(dipole),
+        )
         tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
         if trace.shape[0] > 0:
             _note(trace[c, k], rotation, torque, speeds)
             note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
         rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, actuators.applied)
     return rotation, heading_state, attitude_state, control_state, field_b, field_step
+
+
+@kernel
+def sum_of_sizes(values) -> float:
+    """Sum of an array (N,) without its signs."""
+    total = 0.0
+    for value in values:
+        total += abs(value)
+    return total
 
 
 @kernel

@@ -38,7 +38,7 @@ def tallied(pointing_deg, illumination, rates, period_s):
     true, estimated = tilted(pointing_deg), tilted(pointing_deg + OFF_DEG)
     for step, rate in enumerate(rates.tolist()):
         sun_b, said = tuple(true[step].tolist()), heading(estimated[step].tolist())
-        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL)
+        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL, dipole)
         _tally_step(tallies, 0, step, int(marks[step]), truth, said, None, None)
     (row,) = case_table(np.arange(1), tallies, period_s, WINDOWS).to_pylist()
     return row
