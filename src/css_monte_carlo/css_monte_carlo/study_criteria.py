@@ -73,7 +73,9 @@ def judge(study: Study) -> list[Judged]:
     ]
 
 
-def _judged(labels: dict[str, Any], rows: pa.Table, criteria: Mapping[str, Mapping[str, float]], share: float) -> Judged:
+def _judged(
+    labels: dict[str, Any], rows: pa.Table, criteria: Mapping[str, Mapping[str, float]], share: float
+) -> Judged:
     numbers = rows["case"].to_numpy()
     met = np.ones(len(numbers), dtype=bool)
     missed: dict[str, list[int]] = {}

@@ -53,8 +53,8 @@ def _spin_axis_findings(moments: np.ndarray, axes: np.ndarray, normal_b: np.ndar
         )
     elif moments[2] < _LEAST_RATIO * moments[1]:
         yield Finding(
-            f"spacecraft.inertia: the largest moment is {moments[2] / moments[1]:.3g} times the next, expected at least "
-            f"{_LEAST_RATIO:g}: next to nothing holds the spin axis in the body"
+            f"spacecraft.inertia: the largest moment is {moments[2] / moments[1]:.3g} times the next, expected at "
+            f"least {_LEAST_RATIO:g}: next to nothing holds the spin axis in the body"
         )
 
 

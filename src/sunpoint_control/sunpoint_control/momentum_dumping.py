@@ -7,6 +7,9 @@ derived from them; their torque is tau = -[B x] Gt mu. The wheels take up what t
 (tau - Gs u*). The torque on the body is then -Gs (u* + du) + tau = 0, as long as the wheels in service span
 all directions: dumping does not disturb the pointing.
 
+Omega_ref is a speed common to all wheels, and on top of it that which makes up a momentum h_ref that the wheels
+shall keep together, of least norm: Gs^+ h_ref / Js.
+
 All of it is linear. When wheels near their torque limit have no room for u* + du, wheels and rods are
 reduced by one factor, which keeps the sum at zero.
 """
@@ -16,8 +19,8 @@ from typing import NamedTuple
 
 from css_common.declared import builder, computed, given, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Values, choice, flag, real
-from css_common.vectors import Vec3, add, norm, scale, subtract
+from css_common.schema import Values, choice, flag, real, reals
+from css_common.vectors import Vec3, add, norm, scale, subtract, vector_of
 from sunpoint_control.torque_rods import NO_FIELD, TorqueRods, limit_dipoles, rod_dipoles, rod_torque
 from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
 
@@ -42,6 +45,17 @@ class DumpingParameters(NamedTuple):
     reference_speed: float = made(  # [rad/s]
         lambda rpm: rpm * _RPM,
         real("dumping.reference_speed_rpm", 0.0, "rpm", "wheel speed to dump to", low=-1e5, high=1e5, tunable=True),
+    )
+    momentum_b: Vec3 = made(  # [N m s]
+        vector_of,
+        reals(
+            "dumping.momentum",
+            (0.0, 0.0, 0.0),
+            "N m s",
+            "momentum of all wheels in b to dump to, on top of dumping.reference_speed_rpm",
+            length=3,
+            tunable=True,
+        ),
     )
     wheel_inertia: float = computed(_wheel_inertia)  # [kg m^2]
     rods: TorqueRods = part(TorqueRods)
@@ -95,4 +109,5 @@ def add_dumping(
 def _despin_torque(p: DumpingParameters, wheel, speed: float) -> float:
     if wheel.mx == 0.0 and wheel.my == 0.0 and wheel.mz == 0.0:
         return 0.0  # out of service
-    return -p.gain * p.wheel_inertia * (speed - p.reference_speed)
+    reference = p.reference_speed + least_torque(wheel, p.momentum_b) / p.wheel_inertia
+    return -p.gain * p.wheel_inertia * (speed - reference)

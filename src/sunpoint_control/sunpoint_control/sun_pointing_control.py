@@ -12,7 +12,7 @@ from typing import NamedTuple
 from css_common.declared import builder, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice
-from css_common.vectors import Vec3, norm
+from css_common.vectors import Vec3, norm, scale
 from sunpoint_control import modes
 from sunpoint_control.control_output import LARGEST_DIRECTION, LARGEST_FIELD, LARGEST_RATE, ControlOutput, within
 from sunpoint_control.held_field import HeldField
@@ -32,7 +32,8 @@ from sunpoint_control.mrp_sun_pointing import (
     damping_torque,
     error_mrp,
     integrate_error,
-    pointing_torque,
+    spin_reference,
+    tracking_torque,
 )
 from sunpoint_control.wheel_allocation import WHEELS_OUT, AllocationParameters, allocate, limit_torques, wheel_momentum
 
@@ -77,6 +78,7 @@ class ControlState(NamedTuple):
     """Carried from cycle to cycle."""
 
     integral: Vec3  # [N m s] K int(sigma_br) dt
+    spin: float  # [rad/s] rate of the reference about the Sun line
     modes: ModeState
 
 
@@ -95,7 +97,7 @@ def conflicts(values: Values) -> Iterator[str]:
 
 def initial_state(p: ControlParameters) -> ControlState:
     """No error integrated yet, acquiring the Sun."""
-    return ControlState(_ZERO, modes.initial_state())
+    return ControlState(_ZERO, 0.0, modes.initial_state())
 
 
 @kernel
@@ -152,24 +154,30 @@ def step(
 
     torque_b = _ZERO
     z = state.integral
+    spin = state.spin
     deadband = False
     feedback = False
     if rate_known and mode != MODE_SAFE:
         attitude_known = error >= 0.0 and mode != MODE_DETUMBLE and mode != MODE_SUN_SEARCH
         if mode == MODE_ECLIPSE:
             attitude_known = attitude_known and p.eclipse_behaviour == _HOLD
-        if attitude_known and error < p.pointing.deadband:
-            deadband = True
-            if p.pointing.damp_in_deadband:
-                torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
-        elif attitude_known:
-            feedback = True
-            torque_b, z = pointing_torque(p.pointing, sigma_br, omega_bn_b, state.integral, momentum_b)
+        if attitude_known:
+            reference, spin = spin_reference(p.pointing, sun_b, state.spin, dt)
+            if error < p.pointing.deadband:
+                deadband = True
+                if p.pointing.damp_in_deadband:
+                    torque_b = damping_torque(p.pointing, omega_bn_b, reference.omega_rn_b)
+            else:
+                feedback = True
+                torque_b, z = tracking_torque(p.pointing, sigma_br, omega_bn_b, state.integral, momentum_b, reference)
         elif mode == MODE_SUN_SEARCH:
             wanted_rate = search_rate(p.modes, mode_state.search_time)
             torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
         elif mode != MODE_ECLIPSE or p.eclipse_behaviour != _COAST:
-            torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
+            # in the shadow a spin goes on about the array normal, which was on the Sun
+            spinning = mode == MODE_ECLIPSE and spin != 0.0
+            wanted_rate = scale(spin, p.pointing.array_normal_b) if spinning else _ZERO
+            torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
 
     allocate(p.allocation, torque_b, torque_out)
     wheels_saturated = limit_torques(p.allocation, torque_out)
@@ -199,4 +207,4 @@ def step(
         wheels_saturated,
         rods_saturated,
     )
-    return ControlState(integral, mode_state), output
+    return ControlState(integral, spin, mode_state), output
