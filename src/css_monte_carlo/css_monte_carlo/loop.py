@@ -88,7 +88,7 @@ class Actuators(NamedTuple):
 
 
 TRUTH_COLUMNS = 6
-"""Columns of a trace that hold sigma_bn and omega_bn_b; the measured estimate, wheel torques and speeds follow."""
+"""Columns of a trace that hold sigma_bn and omega_bn_b; the estimate, dipoles, wheel torques and speeds follow."""
 
 
 @kernel
@@ -189,7 +189,7 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         )
         tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
         if trace.shape[0] > 0:
-            _note(trace[c, k], rotation, torque, speeds)
+            _note(trace[c, k], rotation, dipole, torque, speeds)
             note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
         rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, actuators.applied)
     return rotation, heading_state, attitude_state, control_state, field_b, field_step
@@ -214,10 +214,12 @@ def _own_light(albedo_model, around, k, e, reflectivity, light_out) -> None:
 
 
 @kernel
-def _note(out, rotation, torque, speeds) -> None:
+def _note(out, rotation, dipole, torque, speeds) -> None:
     for i in range(3):
         out[i], out[3 + i] = rotation.sigma_bn[i], rotation.omega_bn_b[i]
-    wheels = torque.shape[0]
+    wheels, rods = torque.shape[0], dipole.shape[0]
     end = out.shape[0]
+    for i in range(rods):
+        out[end - 2 * wheels - rods + i] = dipole[i]
     for i in range(wheels):
         out[end - 2 * wheels + i], out[end - wheels + i] = torque[i], speeds[i]

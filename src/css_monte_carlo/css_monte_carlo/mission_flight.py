@@ -102,8 +102,10 @@ class MissionFlight:
 
     @property
     def trace_columns(self) -> int:
-        """Columns of a trace: truth, the measured estimate, torques and speeds of the wheels."""
-        return TRUTH_COLUMNS + self.measure.estimate_columns + 2 * len(wheel_axes(self._plant.values))
+        """Columns of a trace: truth, the measured estimate, dipoles of the rods, torques and speeds of the wheels."""
+        values = self._plant.values
+        rods = len(values.rods.axes) if values.rods.fitted else 0
+        return TRUTH_COLUMNS + self.measure.estimate_columns + rods + 2 * len(wheel_axes(values))
 
     def stretches(self, cases: Cases) -> Iterator[Stretch]:
         """The stretches between scripted events, in order."""
