@@ -106,7 +106,7 @@ class Controller(Component):
     def _held_field(self, stamp_ns: int, received: Received) -> HeldField:
         """Last field measurement, for as long as the next may be on its way."""
         field = received.get("field")
-        fresh = field is not None and field.magnetic_field_covariance[0] != -1.0
+        fresh = field is not None and bool(field.magnetic_field_covariance[0] != -1.0)
         field_b = self._field.field_b
         if field is not None and fresh:
             field_b = vector_of(field.magnetic_field)

@@ -101,13 +101,14 @@ def usable(field: HeldField) -> bool:
 def _turned(p: FieldMotionParameters, motion: FieldMotion, dt: float, torque_b: Vec3) -> FieldMotion:
     """Rate and direction of the field after `dt` [s] without a measurement."""
     since = motion.since + dt
-    if not motion.known:
-        return FieldMotion(motion.measured_b, motion.turned_b, motion.size, since, _ZERO, _ZERO, False)
+    if not motion.known or since > p.longest_gap:
+        return FieldMotion(motion.measured_b, motion.measured_b, motion.size, since, _ZERO, _ZERO, False)
     turned_b = unit(multiply(rotation_vector_to_dcm(scale(dt, motion.omega_bn_b)), motion.turned_b))
     gyroscopic_b = cross(motion.omega_bn_b, multiply(p.inertia_b, motion.omega_bn_b))
     change_b = multiply(p.inertia_inverse_b, subtract(torque_b, gyroscopic_b))
     omega_bn_b = add(motion.omega_bn_b, scale(dt, change_b))
-    known = since <= p.longest_gap and within(omega_bn_b, LARGEST_RATE)
+    # a rate beyond reason is lost, and begins anew with the next pair
+    known = within(omega_bn_b, LARGEST_RATE)
     return FieldMotion(motion.measured_b, turned_b, motion.size, since, motion.derivative_b, omega_bn_b, known)
 
 

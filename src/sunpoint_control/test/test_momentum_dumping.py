@@ -97,6 +97,21 @@ def test_wheels_come_to_their_reference_speed_under_a_turning_field(reference_rp
     assert np.abs(speeds - reference).max() < 2.0
 
 
+def test_wheels_come_to_the_momentum_that_they_shall_keep():
+    """A bias as a vector in b, beside a speed that all wheels have in common."""
+    bias = np.array((0.02, -0.01, 0.03))
+    p, wheels = parameters(dumping__momentum=bias.tolist(), dumping__reference_speed_rpm=100.0)
+    speeds = np.array([150.0, -80.0, 60.0, -30.0])
+    for t in np.arange(0.0, 20_000.0, 5.0):
+        phase = 2.0 * np.pi * t / 5550.0
+        field_b = (2e-5 * np.cos(phase), 3e-5 * np.sin(phase), 2e-5 * np.sin(2.0 * phase))
+        torques, _, _ = dump(p, wheels, speeds, field_b)
+        speeds = speeds + 5.0 * torques / p.wheel_inertia
+    common = 100.0 * np.pi / 30.0
+    np.testing.assert_allclose(p.wheel_inertia * AXES.T @ (speeds - common), bias, atol=0.01 * 0.05)
+    np.testing.assert_allclose(speeds, common + np.linalg.pinv(AXES.T) @ bias / p.wheel_inertia, atol=2.0)
+
+
 def test_without_field_there_is_no_dumping():
     p, wheels = parameters()
     torques, dipoles, (mask, active) = dump(p, wheels, (100.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
