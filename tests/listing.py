@@ -58,6 +58,17 @@ def with_every_flag(kind: type[Component]) -> dict[str, bool]:
     return {p.name.replace(".", "__"): True for p in kind.table() if p.kind == "flag"}
 
 
+def controlled_by(name: str, base: type[Component]) -> bool:
+    """Whether a component of a base class flies in a mission."""
+    return any(issubclass(node.component, base) for node in load_mission(name).nodes)
+
+
+def anywhere(base: type[Component]) -> list[str]:
+    """Estimators of a base class that fly in the mission of O'Keefe & Schaub too: all but those for Clark's cells."""
+    by_mission = estimators_by_mission(base)
+    return sorted(name for mission, names in by_mission.items() if not mission.startswith("clark") for name in names)
+
+
 def estimators_by_mission(base: type[Component]) -> dict[str, list[str]]:
     """Estimators of a base class by the mission that they fly in; those of none may fly in that of O'Keefe & Schaub."""
     by_mission: dict[str, list[str]] = {}

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from css_analysis.flight_metrics import Windows
 from css_analysis.flight_summary import criteria_failures, criteria_verdicts, summary_table
-from css_analysis.quantities import QUANTITIES, summaries
+from css_analysis.quantities import flight_quantities, summaries
 from css_analysis.readable_table import ReadableTable
 from css_common.mission import load_mission
 from css_monte_carlo.verbs.coverage import _print_tables, study
@@ -26,7 +26,7 @@ def printed(thing, width):
 
 def run(estimator, first, **changes):
     """A run whose numbers all differ."""
-    values = {quantity: first + 1.25 * i for i, quantity in enumerate(QUANTITIES)}
+    values = {quantity: first + 1.25 * i for i, quantity in enumerate(flight_quantities(Windows()))}
     fixed = {"estimator": estimator, "gyro": "on", "flown": False, "steps_without_estimate": int(first)}
     return values | fixed | changes
 
@@ -80,7 +80,7 @@ def test_summary_of_a_flight(width):
     text = printed(summary_table(runs, "a flight"), width)
     assert "…" not in text
     for first in (100.0, 2000.0):
-        for i, quantity in enumerate(QUANTITIES):
+        for i, quantity in enumerate(flight_quantities(Windows())):
             if quantity not in ("pointing_error_sunlit_deg", "heading_error_sunlit_deg", "steps_without_estimate"):
                 assert f"{first + 1.25 * i:.2f}"[:5] in text, (quantity, text)
     assert all(len(line.rstrip()) <= width for line in text.splitlines())

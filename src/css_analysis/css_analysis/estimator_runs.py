@@ -6,13 +6,13 @@ from typing import Any
 
 from css_analysis.flight_log import FlightLog
 from css_analysis.flight_metrics import EstimatorMeasures, FlightMeasures
-from css_analysis.quantities import QUANTITIES
+from css_analysis.quantities import flight_quantities
 
 Run = dict[str, Any]
 
 
 def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: str | None = None) -> list[Run]:
-    """One dictionary for each estimator: its name, gyro, flown and `quantities.QUANTITIES`.
+    """One dictionary for each estimator: its name, gyro, flown and `quantities.flight_quantities`.
 
     Convergence, pointing errors and final rate belong to the flight: an estimator that was replayed or flew beside has
     those of the one that controlled.
@@ -35,4 +35,5 @@ def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: st
 
 
 def _measured(estimator: EstimatorMeasures) -> Run:
-    return {name: q.measure(estimator) for name, q in QUANTITIES.items() if q.measure is not None}
+    asked_for = flight_quantities(estimator.flight.windows)
+    return {name: q.measure(estimator) for name, q in asked_for.items() if q.measure is not None}

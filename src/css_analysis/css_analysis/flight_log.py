@@ -25,6 +25,7 @@ from css_msgs.msg import (
     AttitudeEstimate,
     ControlStatus,
     CssVoltages,
+    RodDipoleCommand,
     SpacecraftState,
     SunEstimate,
     WheelState,
@@ -47,6 +48,7 @@ _SINGLE = {
     "voltages": (CssVoltages, "/css/voltages"),
     "wheels": (WheelState, "/wheels/state"),
     "torque_command": (WheelTorqueCommand, "/wheels/torque_command"),
+    "rod_command": (RodDipoleCommand, "/rods/dipole_command"),
     "control": (ControlStatus, "/control/status"),
 }
 LOGGED_TYPES: dict[str, type] = {
@@ -85,7 +87,7 @@ class FlightLog:
         truth: `SpacecraftState` columns, None for telemetry of a real vehicle.
         estimates: name of the estimator to `SunEstimate` columns.
         attitudes: name of the attitude filter to `AttitudeEstimate` columns.
-        voltages, wheels, torque_command, control: columns of the topic, None when there is none.
+        voltages, wheels, torque_command, rod_command, control: columns of the topic, None when there is none.
         notes: what could not be read, one line each.
         imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
             arrays of its mission are unknown.
@@ -99,6 +101,7 @@ class FlightLog:
     voltages: Columns | None = None
     wheels: Columns | None = None
     torque_command: Columns | None = None
+    rod_command: Columns | None = None
     control: Columns | None = None
     notes: list[str] = field(default_factory=list)
     imported: bool = False
@@ -166,7 +169,7 @@ class FlightLog:
     @cached_property
     def flown(self) -> str | None:
         """Name of the estimator that the control listened to; None without control or when unknown."""
-        controlled = self.control is not None or self.torque_command is not None
+        controlled = any(c is not None for c in (self.control, self.torque_command, self.rod_command))
         if self.mission is None or not controlled:
             return None
         return self.mission.values.graph.estimator

@@ -7,6 +7,7 @@ Everything is measured against the truth; without a truth in the log every quant
 sunlit          more than half of the solar disc is in view (truth.illumination > 0.5).
 power positive  the true Sun is within 30 deg of the array normal.
 acquisition     the first moment from which the flight stays sunlit and power positive for 60 s.
+detumbled       the first moment from which the body rate stays below `measures.detumbled_rate_deg_s` for 60 s.
 
 Imported telemetry says nothing about solar arrays and orbit: nothing is told of pointing and acquisition, and errors
 of estimates count over all of its lines.
@@ -35,6 +36,7 @@ class Windows(NamedTuple):
     settled_time: float = 0.0  # [s] from the epoch, after which an attitude filter counts as settled
     late_time: float = 0.0  # [s] sunlit at the end of a flight, of the late heading error
     report_time: float = 0.0  # [s] from the epoch, at which studies state the rates
+    detumbled_rate_deg_s: float = 0.0  # body rate below which a spacecraft counts as detumbled
 
 
 def windows_of(mission: Mission | None) -> Windows:
@@ -47,9 +49,12 @@ def windows_of(mission: Mission | None) -> Windows:
 
 def acquisition(log: FlightLog) -> int | None:
     """Step of the truth from which the flight stays sunlit and power positive for 60 s; None if never."""
-    if log.truth is None:
-        return None
-    for first, last in _runs(log.sunlit & (log.pointing_error <= POWER_POSITIVE)):
+    return None if log.truth is None else _lasting(log, log.sunlit & (log.pointing_error <= POWER_POSITIVE))
+
+
+def _lasting(log: FlightLog, flags: np.ndarray) -> int | None:
+    """First step of the truth from which a flag holds for 60 s; None if it never does."""
+    for first, last in _runs(flags):
         # a hundredth of a step of slack: stamps are whole nanoseconds
         if _span(log, first, last) >= ACQUIRED_AFTER - 0.01 * log.period:
             return first
@@ -118,6 +123,37 @@ class FlightMeasures:
     def pointing_error_sunlit_deg(self) -> float | None:
         """Mean pointing error in sunlight."""
         return _mean_deg(self.log.pointing_error[self.log.sunlit]) if self.knows_arrays else None
+
+    def power_positive_from_s(self) -> float | None:
+        """Time from which the Sun stays within 30 deg of the array normal in all sunlight that is left."""
+        if not self.knows_arrays:
+            return None
+        within = np.flatnonzero(self.log.sunlit & (self.log.pointing_error <= POWER_POSITIVE))
+        away = np.flatnonzero(self.log.sunlit & (self.log.pointing_error > POWER_POSITIVE))
+        kept = within if len(away) == 0 else within[within > away[-1]]
+        return self._time_of(int(kept[0])) if len(kept) else None
+
+    def power_positive_late(self) -> float | None:
+        """Share of the last `Windows.late_time` of sunlight with the Sun within 30 deg of the array normal."""
+        if not self.knows_arrays or self.windows.late_time == 0.0 or self.log.period == 0.0:
+            return None
+        late = np.flatnonzero(self.log.sunlit)[-max(1, round(self.windows.late_time / self.log.period)) :]
+        return float(np.mean(self.log.pointing_error[late] <= POWER_POSITIVE)) if len(late) else None
+
+    def detumbled_s(self) -> float | None:
+        """Time from which the body rate stays low for 60 s."""
+        if self.log.truth is None:
+            return None
+        return self._time_of(_lasting(self.log, self.log.rate < np.radians(self.windows.detumbled_rate_deg_s)))
+
+    def rod_dipole_mean(self) -> float | None:
+        """Mean over the flight of the dipoles of all rods, without their signs."""
+        commands = self.log.rod_command
+        return None if commands is None else float(np.mean(np.sum(np.abs(commands.dipole), axis=1)))
+
+    def _time_of(self, step: int | None) -> float | None:
+        truth = self.log.truth
+        return None if step is None or truth is None else float(self.log.time(truth)[step])
 
     def rate_final_deg_s(self) -> float | None:
         """Mean rate at the end; a table without rates has zeros there."""

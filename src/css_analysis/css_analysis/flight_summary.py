@@ -37,9 +37,10 @@ def summary_table(runs: Iterable[Run], title: str = "") -> ReadableTable:
 
 def _columns_of(runs: Sequence[Run]) -> list[Quantity]:
     """The columns of Sun estimators, and where there are attitude filters, theirs and what else has a value."""
+    asked_for = [quantity for quantity in _COLUMNS if all(quantity.name in run for run in runs)]
     if any(run["attitude_error_mean_deg"] is not None for run in runs):
-        return [quantity for quantity in _COLUMNS if any(run[quantity.name] is not None for run in runs)]
-    return [quantity for quantity in _COLUMNS if not quantity.name.startswith("attitude")]
+        return [quantity for quantity in asked_for if any(run[quantity.name] is not None for run in runs)]
+    return [quantity for quantity in asked_for if not quantity.name.startswith("attitude")]
 
 
 def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = None) -> None:
@@ -76,7 +77,7 @@ def criteria_verdicts(criteria: Mapping[str, Mapping[str, float]], runs: Iterabl
     runs = list(runs)
     judged = [run for run in runs if run["flown"]] or runs
     return [
-        Verdict(run["estimator"], quantity, run[quantity], bound, limits[bound])
+        Verdict(run["estimator"], quantity, run.get(quantity), bound, limits[bound])
         for quantity, limits in criteria.items()
         if quantity in QUANTITIES
         for run in judged

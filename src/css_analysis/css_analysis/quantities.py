@@ -71,7 +71,7 @@ class Summary:
     Attributes:
         name: in JSON.
         of: column of the study's table of cases.
-        over: `mean` or `max` of the cases that have a value, or the `share` of cases that have one.
+        over: `mean`, `p95` or `max` of the cases that have a value, or the `share` of cases that have one.
         heading, unit, form: as a `Quantity` has them.
     """
 
@@ -124,18 +124,13 @@ def _converging(sums: CaseSums) -> np.ndarray:
     return np.where(t["within"] > 0, (t["away_first"] + t["away_later"]) * sums.period_s, np.nan)
 
 
-def _acquired(sums: CaseSums) -> np.ndarray:
-    step = sums.totals["acquired_step"]
-    return np.where(step >= 0, step * sums.period_s, np.nan)
+def _first(step: str) -> Callable[[CaseSums], np.ndarray]:
+    """Time [s] of a step since the epoch, NaN for -1."""
+    return lambda sums: np.where(sums.totals[step] >= 0, sums.totals[step] * sums.period_s, np.nan)
 
 
 def _error_p95(sums: CaseSums) -> np.ndarray:
     return np.array([percentile_of_histogram(row, 95.0, sums.bin_deg) for row in sums.histogram])
-
-
-def _first_attitude(sums: CaseSums) -> np.ndarray:
-    step = sums.totals["first_step"]
-    return np.where(step >= 0, step * sums.period_s, np.nan)
 
 
 def _largest_error(sums: CaseSums) -> np.ndarray:
@@ -188,7 +183,46 @@ _CONVERGING = (
     ),
     Quantity("converging_first_s", "s", "sunlit time converging before the first eclipse", tally=_time("away_first")),
     Quantity("converging_later_s", "s", "sunlit time converging after the first eclipse", tally=_time("away_later")),
-    Quantity("acquired_s", "s", "time of the acquisition since the epoch", tally=_acquired),
+    Quantity("acquired_s", "s", "time of the acquisition since the epoch", tally=_first("acquired_step")),
+)
+_DETUMBLED = Quantity(
+    "detumbled_s",
+    "s",
+    "time since the epoch from which the body rate stays below measures.detumbled_rate_deg_s for 60 s",
+    heading="detum-\nbled",
+    form="{:.1f}",
+    without_value="the body rate never stays below measures.detumbled_rate_deg_s for 60 s",
+    measure=lambda m: m.flight.detumbled_s(),
+    tally=_first("detumbled_step"),
+)
+_KEPT = Quantity(
+    "power_positive_from_s",
+    "s",
+    "time since the epoch from which the Sun stays within 30 deg of the array normal in all sunlight that is left",
+    heading="power\npositive\nfrom",
+    form="{:.1f}",
+    without_value="the last sunlit step has the Sun more than 30 deg off the array normal",
+    measure=lambda m: m.flight.power_positive_from_s(),
+    tally=_first("kept_step"),
+)
+_ROD_DIPOLE = Quantity(
+    "rod_dipole_mean",
+    "A m^2",
+    "mean over the flight of the dipoles of all torque rods together, without their signs",
+    heading="rods",
+    form="{:.4f}",
+    without_value="nobody commands torque rods",
+    measure=lambda m: m.flight.rod_dipole_mean(),
+    tally=_mean("dipole_sum", "steps"),
+)
+_POWER_LATE = Quantity(
+    "power_positive_late",
+    "",
+    "share of the last measures.late_time of sunlight with the Sun within 30 deg of the array normal",
+    heading="power\npositive\nlate",
+    form="{:.3f}",
+    measure=lambda m: m.flight.power_positive_late(),
+    tally=_mean("late_within", "late_lit"),
 )
 _LATE = Quantity(
     "heading_error_late_deg",
@@ -263,7 +297,7 @@ _ATTITUDE = (
         "of attitude filters: time of the first attitude since the epoch",
         heading="first\natti-\ntude",
         form="{:.1f}",
-        attitude_tally=_first_attitude,
+        attitude_tally=_first("first_step"),
     ),
 )
 _POINTING = (
@@ -335,6 +369,7 @@ def quantities(windows: Windows) -> tuple[Quantity, ...]:
     """All quantities in the order of tables, those of windows that a mission does not ask for left out."""
     return (
         *_CONVERGING,
+        *(_safe_mode(windows) if windows.detumbled_rate_deg_s > 0.0 else ()),
         _HEADING_MEAN,
         _HEADING_P95,
         *((_LATE,) if windows.late_time > 0.0 else ()),
@@ -344,6 +379,11 @@ def quantities(windows: Windows) -> tuple[Quantity, ...]:
         *(_reported(windows.report_time) if windows.report_time > 0.0 else ()),
         *_REST,
     )
+
+
+def _safe_mode(windows: Windows) -> tuple[Quantity, ...]:
+    """What is measured from a tip-off to power."""
+    return (_DETUMBLED, _KEPT, *((_POWER_LATE,) if windows.late_time > 0.0 else ()), _ROD_DIPOLE)
 
 
 def _reported(time: float) -> tuple[Quantity, Quantity]:
@@ -369,8 +409,13 @@ def _reported(time: float) -> tuple[Quantity, Quantity]:
     )
 
 
-QUANTITIES = {quantity.name: quantity for quantity in quantities(Windows()) if quantity.measure is not None}
-"""What every flight is measured by, and criteria may ask for, by name."""
+def flight_quantities(windows: Windows) -> dict[str, Quantity]:
+    """What a flight is measured by, by name."""
+    return {quantity.name: quantity for quantity in quantities(windows) if quantity.measure is not None}
+
+
+QUANTITIES = flight_quantities(Windows(late_time=1.0, detumbled_rate_deg_s=1.0))
+"""What flights may be measured by, and criteria may ask for, by name."""
 
 
 def study_quantities(windows: Windows) -> tuple[Quantity, ...]:
@@ -392,7 +437,23 @@ def summaries(windows: Windows) -> tuple[Summary, ...]:
         Summary("power_positive_fraction", "acquired_s", "share", "power\nposi-\ntive\n", "", "{:.1%}"),
         Summary("converging_mean_s", "converging_s", "mean", "con-\nverging\nmean", "s", "{:.1f}"),
         Summary("converging_max_s", "converging_s", "max", "con-\nverging\nmax", "s", "{:.1f}"),
+        *(_safe_mode_summaries(windows) if windows.detumbled_rate_deg_s > 0.0 else ()),
         *map(_mean_over_cases, reported),
+    )
+
+
+def _safe_mode_summaries(windows: Windows) -> tuple[Summary, ...]:
+    detumbled, kept = _DETUMBLED.name, _KEPT.name
+    late = _POWER_LATE
+    return (
+        Summary("detumbled_mean_s", detumbled, "mean", "detum-\nbled\nmean", "s", "{:.0f}"),
+        Summary("detumbled_p95_s", detumbled, "p95", "detum-\nbled\n95 %", "s", "{:.0f}"),
+        Summary("detumbled_max_s", detumbled, "max", "detum-\nbled\nmax", "s", "{:.0f}"),
+        Summary("power_positive_from_mean_s", kept, "mean", "power\nfrom\nmean", "s", "{:.0f}"),
+        Summary("power_positive_from_p95_s", kept, "p95", "power\nfrom\n95 %", "s", "{:.0f}"),
+        Summary("power_positive_from_max_s", kept, "max", "power\nfrom\nmax", "s", "{:.0f}"),
+        *((_mean_over_cases(late),) if windows.late_time > 0.0 else ()),
+        _mean_over_cases(_ROD_DIPOLE),
     )
 
 

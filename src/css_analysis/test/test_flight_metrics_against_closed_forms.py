@@ -11,9 +11,9 @@ from synthetic_flight import DT, columns, estimates, flight, stamps, tilted, tru
 from css_analysis.estimate_errors import heading_errors, rate_errors, tangent_nees
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import FlightLog
-from css_analysis.flight_metrics import acquisition, sunlit_passes
+from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes
 from css_analysis.flight_summary import criteria_failures, print_summary
-from css_analysis.quantities import QUANTITIES
+from css_analysis.quantities import flight_quantities
 from css_common.mission import load_mission
 from css_msgs.msg import AttitudeEstimate, ControlStatus
 
@@ -53,7 +53,7 @@ def test_all_quantities_of_a_known_flight():
         "rate_final_deg_s": pytest.approx(0.25),
         "steps_without_estimate": 0,
     }
-    assert list(run)[3:] == list(QUANTITIES)
+    assert list(run)[3:] == list(flight_quantities(Windows()))
 
 
 def test_acquisition_is_the_first_minute_within_thirty_degrees():
@@ -141,7 +141,7 @@ def test_slower_and_shorter_estimates():
 def test_foreign_telemetry_has_no_figures_at_all():
     log = FlightLog("foreign", estimates={"obc": estimates(tilted(np.zeros(100)), rate_source=1)})
     (run,) = estimator_runs(log)
-    assert run == {"estimator": "obc", "gyro": "on", "flown": False} | dict.fromkeys(QUANTITIES)
+    assert run == {"estimator": "obc", "gyro": "on", "flown": False} | dict.fromkeys(flight_quantities(Windows()))
     assert acquisition(log) is None and sunlit_passes(log) == []
 
 

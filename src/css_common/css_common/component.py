@@ -210,6 +210,11 @@ class Plant(Component):
     finished: bool = False
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io", "lockstep")
 
+    @classmethod
+    def fastest_start(cls, values: Values) -> float:
+        """Largest body rate [rad/s] at the epoch; 0 where the plant does not say."""
+        return 0.0
+
     def begin(self) -> Outgoing:
         """Messages of step 0."""
         raise NotImplementedError

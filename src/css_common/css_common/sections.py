@@ -217,6 +217,22 @@ MEASURES: Table = (
         "time from the epoch at which studies state the body rate and its error; 0: they do not",
         low=0.0,
     ),
+    real(
+        "measures.detumbled_rate_deg_s",
+        0.0,
+        "deg/s",
+        "body rate below which a spacecraft counts as detumbled; 0: detumbling is not measured",
+        low=0.0,
+        high=360.0,
+    ),
+    real(
+        "measures.required_share",
+        0.0,
+        "-",
+        "share of the cases of a study that must meet the criteria; 0: criteria judge flights alone",
+        low=0.0,
+        high=1.0,
+    ),
 )
 
 GRAPH: Table = (

@@ -46,6 +46,12 @@ TALLY = np.dtype(
             "pointings",
             "sunlit_headings",  # sunlit steps with an estimate, those before acquisition included
             "late",
+            "late_lit",  # late steps, and those of them within 30 deg
+            "late_within",
+            "kept_step",  # first sunlit step within 30 deg after the last beyond; -1: none
+            "slow_run",  # steps below the detumbled rate in a row, until it is detumbled
+            "detumbled_step",  # -1: not yet
+            "steps",
             "reported",
             "final",
             "without_estimate",
@@ -66,13 +72,14 @@ TALLY = np.dtype(
             "final_sum",
             "momentum_max",
             "momentum",
+            "dipole_sum",
             "nis_sum",
             "nees_sum",
         )
     ],
     align=True,
 )
-"""Running sums of one case; angles in deg, rates in deg/s, momentum in N m s."""
+"""Running sums of one case; angles in deg, rates in deg/s, momentum in N m s, dipoles in A m^2."""
 
 
 ESTIMATE_COLUMNS = 6
@@ -88,14 +95,18 @@ class Tallies(NamedTuple):
     samples: np.ndarray  # (C, quantities, S) float32
     acquire_steps: int  # a run of more steps than this is an acquisition
     sample_every: int  # steps from sample to sample
+    detumbled_rate: float  # [deg/s]
 
 
-def new_tallies(cases: int, steps: int, period_s: float, sample_every: int) -> Tallies:
+def new_tallies(
+    cases: int, steps: int, period_s: float, sample_every: int, detumbled_rate_deg_s: float = 0.0
+) -> Tallies:
     """Nothing seen yet, for flights of so many steps."""
     # the hundredth of a step of slack that `flight_metrics` gives
     acquire_steps = math.ceil(ACQUIRED_AFTER / period_s - 0.01)
     totals = np.zeros(cases, TALLY)
-    totals["acquired_step"] = -1
+    for step in ("acquired_step", "kept_step", "detumbled_step"):
+        totals[step] = -1
     return Tallies(
         totals,
         np.zeros((cases, BINS), np.int64),
@@ -103,6 +114,7 @@ def new_tallies(cases: int, steps: int, period_s: float, sample_every: int) -> T
         np.full((cases, len(SAMPLED), sample_count(steps, sample_every)), np.nan, np.float32),
         acquire_steps,
         sample_every,
+        detumbled_rate_deg_s,
     )
 
 
@@ -178,6 +190,12 @@ def tally_step(
         t.nis_sum += heading.nis
     t.momentum = norm(truth.wheel_momentum_b)
     t.momentum_max = max(t.momentum_max, t.momentum)
+    t.steps += 1
+    t.dipole_sum += truth.rod_dipole
+    if tallies.detumbled_rate > 0.0 and t.detumbled_step < 0:
+        t.slow_run = t.slow_run + 1 if _DEG * norm(omega_bn_b) < tallies.detumbled_rate else 0
+        if t.slow_run > tallies.acquire_steps:
+            t.detumbled_step = step - t.slow_run + 1
 
 
 @kernel
@@ -189,8 +207,15 @@ def _tally_sunlit(tallies, c, step, marks, pointing, error) -> None:
             t.away_first += 1
         else:
             t.away_later += 1
+        t.kept_step = -1
     else:
         t.within += 1
+        if t.kept_step < 0:
+            t.kept_step = step
+    if (marks & LATE) != 0:
+        t.late_lit += 1
+        if not away:
+            t.late_within += 1
     t.sunlit_pointing_sum += pointing
     if math.isnan(error):
         t.without_estimate += 1

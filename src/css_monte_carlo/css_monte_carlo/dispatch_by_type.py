@@ -34,14 +34,14 @@ def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
     return _attitude_step(_home(p))(p, state, memory, dt, voltages, aiding, around, k)
 
 
-def command(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out):
+def command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
     """State after one cycle of a control law; without control, torques and dipoles stay as they are.
 
     Args:
         heading: `SunHeading`.
-        p, speeds, field_b, field_valid, torque_out, dipole_out: as of `sun_pointing_control.step`.
+        p, speeds, field, torque_out, dipole_out: as in `sunpoint_control.control_algorithm`.
     """
-    return _control_step(_home(p))(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out)
+    return _control_step(_home(p))(p, state, dt, heading, speeds, field, torque_out, dipole_out)
 
 
 def tally(tallies, c, step, marks, truth, heading, attitude, memory):
@@ -107,16 +107,16 @@ def _attitude_step(home):
 
 
 @overload(command, jit_options={"forceinline": True})
-def _overload_command(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out):
+def _overload_command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
     return _control_step(_home(p))
 
 
 def _control_step(home):
     if home is None:
-        return lambda p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out: None
+        return lambda p, state, dt, heading, speeds, field, torque_out, dipole_out: None
     step = home.step
 
-    def call(p, state, dt, heading, speeds, field_b, field_valid, torque_out, dipole_out):
+    def call(p, state, dt, heading, speeds, field, torque_out, dipole_out):
         after, _ = step(
             p,
             state,
@@ -127,8 +127,7 @@ def _control_step(home):
             heading.omega_bn_b,
             heading.rate_source,
             speeds,
-            field_b,
-            field_valid,
+            field,
             torque_out,
             dipole_out,
         )

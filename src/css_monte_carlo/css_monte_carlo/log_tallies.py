@@ -43,11 +43,12 @@ def tally_headings(tallies: Tallies, c: int, log: FlightLog, name: str, wheels: 
     estimates = log.estimates.get(name)
     rows = _rows_by_step(log, None if estimates is None else log.truth_rows(estimates))
     momentum_b = _wheel_momentum(log, wheels)
+    dipoles = _rod_dipoles(log)
     marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
     count = typed_call(case_tallies.tally_step)
     for step, row in enumerate(rows):
         heading = _NO_HEADING if estimates is None or row < 0 else _heading(estimates, row)
-        truth = _truth(log, step, log.having("truth").sigma_bn[step], momentum_b[step], np.zeros(3))
+        truth = _truth(log, step, log.having("truth").sigma_bn[step], momentum_b[step], np.zeros(3), dipoles[step])
         count(tallies, c, step, int(marks[step]), truth, heading, None, None)
 
 
@@ -71,7 +72,7 @@ def tally_attitudes(tallies: AttitudeTallies, c: int, log: FlightLog, name: str,
         if attitudes is not None and row >= 0:
             solution = _solution(attitudes, row)
             memory.covariance[:] = attitudes.covariance[row].reshape(6, 6)
-        truth = _truth(log, step, sigma_bn[step], np.zeros(3), gyro_bias_b[step])
+        truth = _truth(log, step, sigma_bn[step], np.zeros(3), gyro_bias_b[step], 0.0)
         count(tallies, c, step, int(marks[step]), truth, None, solution, memory)
 
 
@@ -92,10 +93,19 @@ def _wheel_momentum(log: FlightLog, wheels: np.ndarray) -> np.ndarray:
     return (wheels["inertia"] * (log.wheels.speed + truth.omega_bn_b @ axes.T)) @ axes
 
 
-def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b) -> Truth:
+def _rod_dipoles(log: FlightLog) -> list[float]:
+    """(K,) dipoles of all rods without their signs [A m^2]; zero where none is commanded."""
+    dipoles = np.zeros(len(log.having("truth")))
+    if log.rod_command is not None:
+        rows, steps = log.truth_rows(log.rod_command)
+        dipoles[steps] = np.sum(np.abs(log.rod_command.dipole[rows]), axis=1)
+    return dipoles.tolist()
+
+
+def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b, rod_dipole: float) -> Truth:
     omega_bn_b = log.having("truth").omega_bn_b[step]
     vectors = (sigma_bn, omega_bn_b, log.sun_b[step], log.array_normal_b, momentum_b, gyro_bias_b)
-    return Truth(*map(_vec3, vectors))
+    return Truth(*map(_vec3, vectors), rod_dipole)
 
 
 def _heading(estimates, row: int) -> SunHeading:

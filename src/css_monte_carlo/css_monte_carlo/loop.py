@@ -24,6 +24,7 @@ from css_sim.disturbances import Disturbances
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
 from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
 from css_sim.spacecraft import Spacecraft, advance
+from sunpoint_control.held_field import HeldField
 
 
 class Vehicle(NamedTuple):
@@ -89,7 +90,7 @@ class Actuators(NamedTuple):
 
 
 TRUTH_COLUMNS = 6
-"""Columns of a trace that hold sigma_bn and omega_bn_b; the measured estimate, wheel torques and speeds follow."""
+"""Columns of a trace that hold sigma_bn and omega_bn_b; the estimate, dipoles, wheel torques and speeds follow."""
 
 
 @kernel
@@ -180,17 +181,33 @@ def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, fir
         )
         # as the control node has it: the last measurement, for as long as the next may be on its way
         field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
-        control_state = command(
-            v.control, control_state, since_s, heading, speeds, field_b, field_valid, torque, dipole
-        )
+        held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
+        control_state = command(v.control, control_state, since_s, heading, speeds, held, torque, dipole)
         momentum_b = sum_along_axes(craft.body.wheels, momentum)
-        truth = Truth(rotation.sigma_bn, rotation.omega_bn_b, sun_b, v.array_normal_b, momentum_b, read.gyro_bias_b)
+        truth = Truth(
+            rotation.sigma_bn,
+            rotation.omega_bn_b,
+            sun_b,
+            v.array_normal_b,
+            momentum_b,
+            read.gyro_bias_b,
+            sum_of_sizes(dipole),
+        )
         tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
         if trace.shape[0] > 0:
-            _note(trace[c, k], rotation, torque, speeds)
+            _note(trace[c, k], rotation, dipole, torque, speeds)
             note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
         rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, actuators.applied)
     return rotation, heading_state, attitude_state, control_state, field_b, field_step
+
+
+@kernel
+def sum_of_sizes(values) -> float:
+    """Sum of an array (N,) without its signs."""
+    total = 0.0
+    for value in values:
+        total += abs(value)
+    return total
 
 
 @kernel
@@ -203,10 +220,12 @@ def _own_light(albedo_model, around, k, e, reflectivity, light_out) -> None:
 
 
 @kernel
-def _note(out, rotation, torque, speeds) -> None:
+def _note(out, rotation, dipole, torque, speeds) -> None:
     for i in range(3):
         out[i], out[3 + i] = rotation.sigma_bn[i], rotation.omega_bn_b[i]
-    wheels = torque.shape[0]
+    wheels, rods = torque.shape[0], dipole.shape[0]
     end = out.shape[0]
+    for i in range(rods):
+        out[end - 2 * wheels - rods + i] = dipole[i]
     for i in range(wheels):
         out[end - 2 * wheels + i], out[end - wheels + i] = torque[i], speeds[i]

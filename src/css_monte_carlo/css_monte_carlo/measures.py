@@ -32,7 +32,7 @@ class Measure(NamedTuple):
 
 
 def _new_headings(cases: int, steps: int, period_s: float, sample_every: int, windows: Windows) -> CaseTallies:
-    return case_tallies.new_tallies(cases, steps, period_s, sample_every)
+    return case_tallies.new_tallies(cases, steps, period_s, sample_every, windows.detumbled_rate_deg_s)
 
 
 def _new_attitudes(cases: int, steps: int, period_s: float, sample_every: int, windows: Windows) -> CaseTallies:

@@ -40,7 +40,7 @@ from css_sim import (
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
 from css_sim.spacecraft import spacecraft
-from sunpoint_control import sun_pointing_control
+from sunpoint_control.controller import Controller
 
 _NOWHERE = (0.0, 0.0, 0.0)
 _NO_GYRO = gyro.Gyro(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -102,8 +102,10 @@ class MissionFlight:
 
     @property
     def trace_columns(self) -> int:
-        """Columns of a trace: truth, the measured estimate, torques and speeds of the wheels."""
-        return TRUTH_COLUMNS + self.measure.estimate_columns + 2 * len(wheel_axes(self._plant.values))
+        """Columns of a trace: truth, the measured estimate, dipoles of the rods, torques and speeds of the wheels."""
+        values = self._plant.values
+        rods = len(values.rods.axes) if values.rods.fitted else 0
+        return TRUTH_COLUMNS + self.measure.estimate_columns + rods + 2 * len(wheel_axes(values))
 
     def stretches(self, cases: Cases) -> Iterator[Stretch]:
         """The stretches between scripted events, in order."""
@@ -157,7 +159,7 @@ class MissionFlight:
         )
         control = None
         if self._control is not None:
-            control = sun_pointing_control.initial_state(sun_pointing_control.parameters(self._control.values))
+            control = _algorithm(self._control).initial_state(_parameters(self._control, self._control.values))
         states = []
         for key, rotation in zip(keys, rotations, strict=True):
             attitude, memory = self._initial_attitude(key, rotation.sigma_bn, guess_deg)
@@ -204,7 +206,7 @@ class MissionFlight:
             heading_hears_wheels=heading is not None and hears_wheels(heading),
             heading=_parameters(self._heading, heading),
             attitude=_parameters(self._filter, attitude),
-            control=None if control is None else sun_pointing_control.parameters(control),
+            control=_parameters(self._control, control),
             disturbances=craft.disturbances,
             disturbed=craft.disturbed,
             rod_axes_b=craft.rod_axes_b,
@@ -250,14 +252,14 @@ def _values(node: Node | None) -> Values | None:
 
 
 def _algorithm(node: Node) -> Any:
-    """The module of an estimator's node."""
+    """The module of the node of an estimator or a control law."""
     component = node.component
-    assert issubclass(component, (SunEstimator, AttitudeFilter))
+    assert issubclass(component, (SunEstimator, AttitudeFilter, Controller))
     return component.algorithm
 
 
 def _parameters(node: Node | None, values: Values | None) -> Any:
-    """Parameters of the algorithm of an estimator's node, None without the node."""
+    """Parameters of the algorithm of the node of an estimator or a control law, None without the node."""
     return None if node is None else _algorithm(node).parameters(values)
 
 

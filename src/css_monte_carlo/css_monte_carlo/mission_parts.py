@@ -12,9 +12,9 @@ from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
 from css_sim.nodes.magnetometer import Magnetometer
-from sunpoint_control.nodes.mrp_control import MrpControl
+from sunpoint_control.controller import Controller
 
-_PLACES = (Dynamics, CssArray, MrpControl, Gyro, Magnetometer, SunEstimator, AttitudeFilter)
+_PLACES = (Dynamics, CssArray, Controller, Gyro, Magnetometer, SunEstimator, AttitudeFilter)
 
 
 class NoPlace(MissionError):
@@ -47,7 +47,7 @@ def parts_of(mission: Mission, estimator: str | None = None) -> Parts:
     for listed in mission.nodes:
         if not issubclass(listed.component, _PLACES):
             raise _no_place(mission, f"the compiled loop has no place for the node {listed.name}")
-    control = _part(mission, MrpControl)
+    control = _part(mission, Controller)
     parts = Parts(
         plant=_needed(mission, Dynamics),
         array=_needed(mission, CssArray),
@@ -84,7 +84,7 @@ def measured_estimators(mission: Mission) -> list[str]:
     if mission.plant is None:
         raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
     flown = [node for node in mission.nodes if node.name == mission.values.graph.estimator and is_heading(node)]
-    if flown and _part(mission, MrpControl) is not None:
+    if flown and _part(mission, Controller) is not None:
         return [flown[0].name]
     names = [node.name for node in mission.nodes if is_attitude(node) or is_heading(node)]
     if not names:
@@ -93,7 +93,7 @@ def measured_estimators(mission: Mission) -> list[str]:
 
 
 def _part(mission: Mission, component: type[Component]) -> Node | None:
-    nodes = [node for node in mission.nodes if node.component is component]
+    nodes = [node for node in mission.nodes if issubclass(node.component, component)]
     if len(nodes) > 1:
         raise _no_place(mission, f"{nodes[0].name} and {nodes[1].name} are both {component.__name__}; expected one")
     return nodes[0] if nodes else None

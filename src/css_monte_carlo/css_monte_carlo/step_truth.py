@@ -15,3 +15,4 @@ class Truth(NamedTuple):
     array_normal_b: Vec3
     wheel_momentum_b: Vec3  # [N m s] of all wheels
     gyro_bias_b: Vec3  # [rad/s]
+    rod_dipole: float  # [A m^2] commanded in this step, of all rods together without their signs

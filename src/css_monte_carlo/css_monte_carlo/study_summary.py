@@ -65,4 +65,6 @@ def _over(cases: pa.Table, summary: Summary) -> float | None:
         return len(known) / cases.num_rows
     if not len(known):
         return None
+    if summary.over == "p95":
+        return float(np.percentile(known, 95.0))
     return float(np.max(known) if summary.over == "max" else np.mean(known))

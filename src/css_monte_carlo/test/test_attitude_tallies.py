@@ -17,7 +17,7 @@ _tally = typed_call(tally_step)
 SIGMA = (0.2, -0.1, 0.3)
 BIAS = (0.001, -0.002, 0.0005)
 ZERO = (0.0, 0.0, 0.0)
-TRUTH = Truth(SIGMA, ZERO, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), ZERO, BIAS)
+TRUTH = Truth(SIGMA, ZERO, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), ZERO, BIAS, 0.0)
 STEPS, SETTLED = 40, 25
 
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from listing import estimators_by_mission
+from listing import MISSIONS, anywhere, controlled_by
 
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
@@ -15,6 +15,7 @@ from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_msgs.msg import SunEstimate
+from sunpoint_control.nodes.magnetic_control import MagneticControl
 
 CASES = np.array([0, 4])
 
@@ -63,9 +64,12 @@ def same_steps(mission):
     for case, flown in zip(CASES, trace, strict=True):
         log = fly_directly(mission.with_overrides([f"mission.case={case}"]))
         truth, estimate = log.having("truth"), log.estimates[mission.values.graph.estimator]
-        speed = log.having("wheels").speed
-        torque = np.zeros_like(speed) if log.torque_command is None else log.torque_command.torque
-        expected = (truth.sigma_bn, truth.omega_bn_b, estimate.sun_b, estimate.omega_bn_b, torque, speed)
+        expected = [truth.sigma_bn, truth.omega_bn_b, estimate.sun_b, estimate.omega_bn_b]
+        if log.rod_command is not None:
+            expected.append(log.rod_command.dipole)
+        if log.wheels is not None:
+            speed = log.wheels.speed
+            expected += [np.zeros_like(speed) if log.torque_command is None else log.torque_command.torque, speed]
         np.testing.assert_array_equal(flown, np.hstack(expected))
     return trace.shape[1]
 
@@ -76,11 +80,34 @@ def test_every_step_is_the_same(variant):
     assert same_steps(mission) == 200
 
 
-@pytest.mark.parametrize("estimator", estimators_by_mission(SunEstimator)["okeefe_2013"])
+@pytest.mark.parametrize("estimator", anywhere(SunEstimator))
 @pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
 def test_every_estimator_is_the_same(estimator, gyro):
     mission = configured(load_mission("okeefe_2013"), estimator=estimator, gyro=gyro)
     assert same_steps(mission.with_overrides(["mission.duration=20.0"])) == 200
+
+
+RODS_ALONE = {
+    "detumbling": (),
+    "in the shadow": ("orbit.true_anomaly_deg=180.0",),
+    "slow enough for the spin": ("dynamics.initial.rate_deg_s=2.0", "magnetic_control.law=spin"),
+    "detumbling alone": ("dynamics.initial.rate_deg_s=2.0", "magnetic_control.law=detumble"),
+    "the rate of the estimator": (
+        "dynamics.initial.rate_deg_s=2.0",
+        "magnetic_control.rate_from=estimator",
+        "wls.rate.use_field=true",
+    ),
+    "no rest, a field at every cycle": ("magnetometer.divider=1", "magnetic_control.rest_before_measurement=false"),
+}
+
+
+@pytest.mark.parametrize("variant", RODS_ALONE)
+@pytest.mark.parametrize("name", [name for name in MISSIONS if controlled_by(name, MagneticControl)])
+def test_torque_rods_alone_are_the_same(name, variant):
+    mission = load_mission(name, ["mission.duration=60.0", *RODS_ALONE[variant]])
+    assert same_steps(mission) == 240
+    log = fly_directly(mission)
+    assert np.any(log.having("rod_command").dipole)
 
 
 # sunrise after two minutes, and gains that then find the Sun in one

@@ -9,21 +9,23 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from synthetic_flight import estimates, flight, stamps, tilted
+from synthetic_flight import columns, estimates, flight, stamps, tilted
 
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import FlightLog
-from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes
+from css_analysis.flight_metrics import FlightMeasures, Windows, acquisition, sunlit_passes
 from css_common.kernel import typed_call
 from css_estimation.sun.sun_heading import NO_COVARIANCE, VALIDITY_VALID, SunHeading
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import FINAL, LATE, REPORTED, SUNLIT, new_tallies, step_marks, tally_step
 from css_monte_carlo.step_truth import Truth
+from css_msgs.msg import RodDipoleCommand
 
 _tally_step = typed_call(tally_step)
 UP = (0.0, 0.0, 1.0)
 STILL = (0.0, 0.0, 0.0)
-WINDOWS = Windows(settled_time=300.0, late_time=300.0, report_time=3000.0)
+WINDOWS = Windows(settled_time=300.0, late_time=300.0, report_time=3000.0, detumbled_rate_deg_s=0.3)
+DIPOLE = 0.01  # [A m^2] more of it at every step
 OFF_DEG = 2.0  # of the estimate from the true Sun
 
 
@@ -33,12 +35,12 @@ def heading(sun_b):
 
 def tallied(pointing_deg, illumination, rates, period_s):
     """Row of the case table of a flight with the Sun at angles from the array normal, and rates about it [rad/s]."""
-    tallies = new_tallies(1, len(pointing_deg), period_s, 10)
+    tallies = new_tallies(1, len(pointing_deg), period_s, 10, WINDOWS.detumbled_rate_deg_s)
     marks = step_marks(illumination, period_s, WINDOWS)
     true, estimated = tilted(pointing_deg), tilted(pointing_deg + OFF_DEG)
     for step, rate in enumerate(rates.tolist()):
         sun_b, said = tuple(true[step].tolist()), heading(estimated[step].tolist())
-        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL)
+        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL, DIPOLE * step)
         _tally_step(tallies, 0, step, int(marks[step]), truth, said, None, None)
     (row,) = case_table(np.arange(1), tallies, period_s, WINDOWS).to_pylist()
     return row
@@ -48,6 +50,8 @@ def logged(pointing_deg, illumination, rates, period_s) -> FlightLog:
     log = flight(pointing_deg, illumination, ekf=estimates(tilted(pointing_deg + OFF_DEG)))
     truth = log.having("truth")
     truth.omega_bn_b[:, 2] = rates
+    dipole = np.outer(DIPOLE * np.arange(len(rates)), (0.5, -0.3, 0.0, 0.2, 0.0, 0.0, 0.0, 0.0))
+    log.rod_command = columns(RodDipoleCommand, truth.stamp_ns, dipole=dipole)
     truth.stamp_ns = log.estimates["ekf"].stamp_ns = stamps(len(rates), period_s)
     log.period = period_s
     return log
@@ -65,7 +69,7 @@ stretch = st.tuples(
 def test_a_flight_is_counted_as_it_is_logged(stretches):
     pointing = np.concatenate([np.full(n, angle) for n, angle, _ in stretches])
     light = np.concatenate([np.full(n, share) for n, _, share in stretches])
-    rates = np.linspace(0.0, 0.1, len(pointing)) ** 2
+    rates = 0.01 * np.abs(np.cos(np.arange(len(pointing)) / 60.0))  # below 0.3 deg/s for 64 steps at a time
     row, log = tallied(pointing, light, rates, 1.0), logged(pointing, light, rates, 1.0)
     (run,) = estimator_runs(log)
     at = acquisition(log)
@@ -78,6 +82,12 @@ def test_a_flight_is_counted_as_it_is_logged(stretches):
     ):
         expected = run[of_the_log]
         assert row[key] == (None if expected is None else pytest.approx(expected, rel=1e-9)), key
+    measures = FlightMeasures(log)
+    measures.windows = WINDOWS
+    assert row["detumbled_s"] == pytest.approx(measures.detumbled_s())
+    assert row["power_positive_from_s"] == pytest.approx(measures.power_positive_from_s())
+    assert row["power_positive_late"] == pytest.approx(measures.power_positive_late())
+    assert row["rod_dipole_mean"] == pytest.approx(measures.rod_dipole_mean())
     first, *later = [sun.converging_s for sun in sunlit_passes(log)] or [0.0]
     assert (row["converging_first_s"], row["converging_later_s"]) == (first, sum(later))
 

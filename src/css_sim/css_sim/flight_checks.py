@@ -66,14 +66,24 @@ def _field_matters(values: Values, graph: Mapping[str, Node]) -> bool:
 
 def _first_rates(values: Values) -> tuple[str, np.ndarray]:
     """The key of the first body rate, and the largest rate about each axis [rad/s]."""
-    if values.initial.rate == "random":
-        return "initial.max_rate_deg_s", np.full(3, math.radians(values.initial.max_rate_deg_s))
-    return "initial.omega_deg_s", np.radians(np.abs(values.initial.omega_deg_s))
+    initial = values.initial
+    if initial.rate == "random":
+        return "initial.max_rate_deg_s", np.full(3, math.radians(initial.max_rate_deg_s))
+    if initial.rate == "direction":
+        return "initial.rate_deg_s", np.full(3, math.radians(initial.rate_deg_s))
+    return "initial.omega_deg_s", np.radians(np.abs(initial.omega_deg_s))
+
+
+def fastest_start(values: Values) -> float:
+    """Largest norm [rad/s] of the body rate at the epoch."""
+    if values.initial.rate == "direction":
+        return math.radians(values.initial.rate_deg_s)
+    return float(np.linalg.norm(_first_rates(values)[1]))
 
 
 def _rate_findings(values: Values) -> Iterator[Finding]:
-    key, rates = _first_rates(values)
-    fastest, period = float(np.linalg.norm(rates)), values.mission.period
+    key, _ = _first_rates(values)
+    fastest, period = fastest_start(values), values.mission.period
     if fastest > FASTEST:
         yield Finding(
             f"{key}: up to {math.degrees(fastest):.0f} deg/s given, expected at most {math.degrees(FASTEST):.0f}",

@@ -33,6 +33,14 @@ def _rates(omega_deg_s: np.ndarray) -> Vec3:
     return w1, w2, w3
 
 
+_RATE = choice(
+    "initial.rate",
+    "random",
+    ("random", "direction", "fixed"),
+    "uniform per axis, initial.rate_deg_s in a random direction, or initial.omega_deg_s",
+)
+
+
 class InitialConditions(NamedTuple):
     """How a case begins."""
 
@@ -44,13 +52,15 @@ class InitialConditions(NamedTuple):
         vector_of,
         reals("initial.sigma_bn", (0.0, 0.0, 0.0), "-", "MRP of the fixed attitude, b relative to n", length=3),
     )
-    random_rate: bool = made(
-        lambda word: word == "random",
-        choice("initial.rate", "random", ("random", "fixed"), "uniform per axis, or initial.omega_deg_s"),
-    )
+    random_rate: bool = made(lambda word: word == "random", _RATE)
     max_rate: float = made(  # [rad/s]
         math.radians,
         real("initial.max_rate_deg_s", 2.0, "deg/s", "bound of the random rate, per axis", low=0.0, high=3600.0),
+    )
+    random_direction: bool = made(lambda word: word == "direction", _RATE)
+    rate: float = made(  # [rad/s]
+        math.radians,
+        real("initial.rate_deg_s", 2.0, "deg/s", "body rate in a random direction", low=0.0, high=3600.0),
     )
     omega_bn_b: Vec3 = made(  # [rad/s]
         _rates, reals("initial.omega_deg_s", (0.0, 0.0, 0.0), "deg/s", "fixed body rate", length=3)
@@ -89,10 +99,23 @@ def random_rate(key: RandomKey, max_rate: float) -> Vec3:
 
 
 @kernel
+def random_direction(key: RandomKey, rate: float) -> Vec3:
+    """Body rate of a given size [rad/s] in a direction uniform over the sphere."""
+    u = uniform4(key, Stream.INITIAL_RATE, 0, 0)
+    z, azimuth = 2.0 * u[0] - 1.0, 2.0 * math.pi * u[1]
+    across = math.sqrt(1.0 - z * z)
+    return (rate * across * math.cos(azimuth), rate * across * math.sin(azimuth), rate * z)
+
+
+@kernel
 def initial_state(p: InitialConditions, key: RandomKey) -> RotationState:
     """Attitude and rate at the epoch of one case."""
     sigma_bn = random_attitude(key) if p.random_attitude else mrp_shadow(p.sigma_bn)
-    omega_bn_b = random_rate(key, p.max_rate) if p.random_rate else p.omega_bn_b
+    omega_bn_b = p.omega_bn_b
+    if p.random_rate:
+        omega_bn_b = random_rate(key, p.max_rate)
+    elif p.random_direction:
+        omega_bn_b = random_direction(key, p.rate)
     return RotationState(sigma_bn, omega_bn_b)
 
 

@@ -46,6 +46,16 @@ def test_every_axis_points_everywhere_alike(attitudes):
     assert stats.kstest(clocks, *turn).pvalue > SIGNIFICANCE
 
 
+def test_a_tip_off_has_its_rate_in_every_direction():
+    p = initial_conditions.parameters(build(initial__rate="direction", initial__rate_deg_s=10.0))
+    rates = np.array([initial_conditions.initial_state(p, random_key(3, c)).omega_bn_b for c in range(CASES)])
+    np.testing.assert_allclose(np.linalg.norm(rates, axis=1), math.radians(10.0), rtol=1e-12)
+    for i in range(3):
+        assert stats.kstest(rates[:, i] / math.radians(10.0), "uniform", (-1, 2)).pvalue > SIGNIFICANCE
+    azimuths = np.arctan2(rates[:, 1], rates[:, 0])
+    assert stats.kstest(azimuths, "uniform", (-math.pi, 2 * math.pi)).pvalue > SIGNIFICANCE
+
+
 def test_uniform_distribution_is_unchanged_by_a_fixed_rotation(attitudes):
     turn = np.array(mrp_to_dcm((0.2, -0.3, 0.1)))
     turned = attitudes @ turn

@@ -21,6 +21,13 @@ def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]
     turned = np.linalg.matrix_rank(model.authority, tol=1e-6)
     if turned < 3:
         yield Finding(f"wheels_out: the wheels that are left turn the body about {turned} of 3 axes, expected all")
+    speeds = pseudo_inverse(np.asarray(values.wheels.axes), values.wheels_out) @ values.dumping.momentum
+    fastest = float(np.max(np.abs(speeds))) / values.wheels.inertia * 30.0 / np.pi
+    if values.dumping.enabled and fastest > values.wheels.max_speed_rpm:
+        yield Finding(
+            f"dumping.momentum: takes {fastest:.0f} rpm of a wheel, expected at most wheels.max_speed_rpm "
+            f"{values.wheels.max_speed_rpm:g}"
+        )
     gains = Gains(values.gains.k, values.gains.p, values.gains.ki)
     yield from gain_findings(model, gains, _setting(values, model))
 

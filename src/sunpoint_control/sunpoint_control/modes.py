@@ -24,16 +24,18 @@ from css_common.kernel import kernel
 from css_common.schema import Values, flag, integer, real
 from css_common.vectors import Vec3
 
-_DETUMBLE_RATE = real(
+ENABLED = flag("enabled", True, "off: safe mode, actuators at rest", tunable=True)
+DEBOUNCE = integer("modes.debounce", 3, "samples", "samples in a row that must want another mode", low=2, high=1000)
+DETUMBLE_RATE = real(
     "modes.detumble_rate_deg_s", 10.0, "deg/s", "body rate above which it is damped first", low=0.0, high=360.0
 )
-_DETUMBLE_EXIT_RATE = real(
+DETUMBLE_EXIT_RATE = real(
     "modes.detumble_exit_rate_deg_s", 5.0, "deg/s", "body rate below which pointing resumes", low=0.0, high=360.0
 )
-_POINT_ANGLE = real(
+POINT_ANGLE = real(
     "modes.point_angle_deg", 15.0, "deg", "pointing error below which it is on the Sun", low=0.0, high=180.0
 )
-_ACQUIRE_ANGLE = real(
+ACQUIRE_ANGLE = real(
     "modes.acquire_angle_deg", 30.0, "deg", "pointing error above which it no longer is", low=0.0, high=180.0
 )
 _SEARCH_RATE = real("modes.search_rate_deg_s", 1.0, "deg/s", "body rate of the search", low=0.01, high=2.0)
@@ -65,14 +67,12 @@ _SEARCH_PHASES = 3
 class ModeParameters(NamedTuple):
     """Rates in rad/s, angles in rad, times in s."""
 
-    enabled: bool = given(flag("enabled", True, "off: safe mode, actuators at rest", tunable=True))
-    debounce: int = given(
-        integer("modes.debounce", 3, "samples", "samples in a row that must want another mode", low=2, high=1000)
-    )
-    detumble_rate: float = made(math.radians, _DETUMBLE_RATE)
-    detumble_exit_rate: float = made(math.radians, _DETUMBLE_EXIT_RATE)
-    point_angle: float = made(math.radians, _POINT_ANGLE)
-    acquire_angle: float = made(math.radians, _ACQUIRE_ANGLE)
+    enabled: bool = given(ENABLED)
+    debounce: int = given(DEBOUNCE)
+    detumble_rate: float = made(math.radians, DETUMBLE_RATE)
+    detumble_exit_rate: float = made(math.radians, DETUMBLE_EXIT_RATE)
+    point_angle: float = made(math.radians, POINT_ANGLE)
+    acquire_angle: float = made(math.radians, ACQUIRE_ANGLE)
     search_wait: float = given(
         real("modes.search_wait", 20.0, "s", "sunlit time without Sun before the search begins", low=0.0, high=1e4)
     )
@@ -101,9 +101,9 @@ class ModeState(NamedTuple):
 
 def conflicts(values: Values) -> Iterator[str]:
     """Thresholds whose hysteresis is upside down, one message each."""
-    if values[_DETUMBLE_EXIT_RATE] > values[_DETUMBLE_RATE]:
+    if values[DETUMBLE_EXIT_RATE] > values[DETUMBLE_RATE]:
         yield "modes.detumble_exit_rate_deg_s: above modes.detumble_rate_deg_s, expected at most that"
-    if values[_POINT_ANGLE] > values[_ACQUIRE_ANGLE]:
+    if values[POINT_ANGLE] > values[ACQUIRE_ANGLE]:
         yield "modes.point_angle_deg: above modes.acquire_angle_deg, expected at most that"
 
 

@@ -12,8 +12,10 @@ from typing import NamedTuple
 from css_common.declared import builder, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice
-from css_common.vectors import Vec3, norm
+from css_common.vectors import Vec3, norm, scale
 from sunpoint_control import modes
+from sunpoint_control.control_output import LARGEST_DIRECTION, LARGEST_FIELD, LARGEST_RATE, ControlOutput, within
+from sunpoint_control.held_field import HeldField
 from sunpoint_control.modes import (
     MODE_DETUMBLE,
     MODE_ECLIPSE,
@@ -30,7 +32,8 @@ from sunpoint_control.mrp_sun_pointing import (
     damping_torque,
     error_mrp,
     integrate_error,
-    pointing_torque,
+    spin_reference,
+    tracking_torque,
 )
 from sunpoint_control.wheel_allocation import WHEELS_OUT, AllocationParameters, allocate, limit_torques, wheel_momentum
 
@@ -43,11 +46,7 @@ _ECLIPSE = {"coast": 0, "rate_damp": 1, "hold_attitude": 2}
 _COAST = _ECLIPSE["coast"]
 _HOLD = _ECLIPSE["hold_attitude"]
 
-# Beyond these an input is a fault, not a measurement.
-_LARGEST_DIRECTION = 2.0
-_LARGEST_RATE = 100.0  # [rad/s]
-_LARGEST_SPEED = 1e6  # [rad/s]
-_LARGEST_FIELD = 1.0  # [T]
+_LARGEST_SPEED = 1e6  # [rad/s] beyond it a reading is a fault
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
@@ -79,23 +78,8 @@ class ControlState(NamedTuple):
     """Carried from cycle to cycle."""
 
     integral: Vec3  # [N m s] K int(sigma_br) dt
+    spin: float  # [rad/s] rate of the reference about the Sun line
     modes: ModeState
-
-
-class ControlOutput(NamedTuple):
-    """What one cycle decided; see css_msgs/ControlStatus."""
-
-    torque_b: Vec3  # [N m] asked of the wheels, on the body
-    integral: Vec3  # [N m s] z of the control law
-    wheel_momentum_b: Vec3  # [N m s]
-    pointing_error: float  # [rad] -1: no Sun known
-    rate: float  # [rad/s]
-    mode: int
-    reason: int
-    deadband: bool
-    dumping: bool
-    wheels_saturated: int  # bit i: wheel i was asked for more than it may give
-    rods_saturated: int  # bit i: rod i was asked for more than it may give
 
 
 def conflicts(values: Values) -> Iterator[str]:
@@ -113,21 +97,7 @@ def conflicts(values: Values) -> Iterator[str]:
 
 def initial_state(p: ControlParameters) -> ControlState:
     """No error integrated yet, acquiring the Sun."""
-    return ControlState(_ZERO, modes.initial_state())
-
-
-def at_rest(mode: int, reason: int) -> ControlOutput:
-    """Output of a control that does nothing: no torque, nothing known."""
-    return ControlOutput(_ZERO, _ZERO, _ZERO, -1.0, 0.0, mode, reason, False, False, 0, 0)
-
-
-@kernel
-def _within(values, limit: float) -> bool:
-    # a NaN compares false
-    for value in values:  # noqa: SIM110  (a generator expression does not compile)
-        if not abs(value) <= limit:
-            return False
-    return True
+    return ControlState(_ZERO, 0.0, modes.initial_state())
 
 
 @kernel
@@ -141,8 +111,7 @@ def step(
     omega_bn_b: Vec3,
     rate_source: int,
     wheel_speeds,
-    field_b: Vec3,
-    field_valid: bool,
+    field: HeldField,
     torque_out,
     dipole_out,
 ) -> tuple[ControlState, ControlOutput]:
@@ -152,15 +121,13 @@ def step(
         dt: time since the last cycle [s].
         sun_b, validity, eclipse, omega_bn_b, rate_source: fields of the Sun estimate.
         wheel_speeds: (n,) relative to the body [rad/s].
-        field_b, field_valid: magnetic field [T], and whether there is a measurement.
+        field: the measured magnetic field.
         torque_out: (n,) motor torques [N m], written.
         dipole_out: (m,) rod dipoles [A m^2], written; may be empty without rods.
     """
     dt = dt if 0.0 < dt < math.inf else 0.0
     inputs_ok = (
-        _within(sun_b, _LARGEST_DIRECTION)
-        and _within(omega_bn_b, _LARGEST_RATE)
-        and _within(wheel_speeds, _LARGEST_SPEED)
+        within(sun_b, LARGEST_DIRECTION) and within(omega_bn_b, LARGEST_RATE) and within(wheel_speeds, _LARGEST_SPEED)
     )
     sigma_br = _ZERO
     error = -1.0
@@ -187,24 +154,30 @@ def step(
 
     torque_b = _ZERO
     z = state.integral
+    spin = state.spin
     deadband = False
     feedback = False
     if rate_known and mode != MODE_SAFE:
         attitude_known = error >= 0.0 and mode != MODE_DETUMBLE and mode != MODE_SUN_SEARCH
         if mode == MODE_ECLIPSE:
             attitude_known = attitude_known and p.eclipse_behaviour == _HOLD
-        if attitude_known and error < p.pointing.deadband:
-            deadband = True
-            if p.pointing.damp_in_deadband:
-                torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
-        elif attitude_known:
-            feedback = True
-            torque_b, z = pointing_torque(p.pointing, sigma_br, omega_bn_b, state.integral, momentum_b)
+        if attitude_known:
+            reference, spin = spin_reference(p.pointing, sun_b, state.spin, dt)
+            if error < p.pointing.deadband:
+                deadband = True
+                if p.pointing.damp_in_deadband:
+                    torque_b = damping_torque(p.pointing, omega_bn_b, reference.omega_rn_b)
+            else:
+                feedback = True
+                torque_b, z = tracking_torque(p.pointing, sigma_br, omega_bn_b, state.integral, momentum_b, reference)
         elif mode == MODE_SUN_SEARCH:
             wanted_rate = search_rate(p.modes, mode_state.search_time)
             torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
         elif mode != MODE_ECLIPSE or p.eclipse_behaviour != _COAST:
-            torque_b = damping_torque(p.pointing, omega_bn_b, _ZERO)
+            # in the shadow a spin goes on about the array normal, which was on the Sun
+            spinning = mode == MODE_ECLIPSE and spin != 0.0
+            wanted_rate = scale(spin, p.pointing.array_normal_b) if spinning else _ZERO
+            torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
 
     allocate(p.allocation, torque_b, torque_out)
     wheels_saturated = limit_torques(p.allocation, torque_out)
@@ -217,8 +190,10 @@ def step(
     dumping = False
     dipole_out[:] = 0.0
     allowed = mode == MODE_ECLIPSE or (mode != MODE_SAFE and not p.dumping.in_eclipse_only)
-    if p.dumping.enabled and allowed and field_valid and inputs_ok and _within(field_b, _LARGEST_FIELD):
-        rods_saturated, dumping = add_dumping(p.dumping, p.allocation, wheel_speeds, field_b, torque_out, dipole_out)
+    if p.dumping.enabled and allowed and field.valid and inputs_ok and within(field.field_b, LARGEST_FIELD):
+        rods_saturated, dumping = add_dumping(
+            p.dumping, p.allocation, wheel_speeds, field.field_b, torque_out, dipole_out
+        )
     output = ControlOutput(
         torque_b,
         z,
@@ -232,4 +207,4 @@ def step(
         wheels_saturated,
         rods_saturated,
     )
-    return ControlState(integral, mode_state), output
+    return ControlState(integral, spin, mode_state), output

@@ -9,7 +9,8 @@ from okeefe_spacecraft import okeefe_values
 
 from css_common.sections import RODS, WHEELS
 from sunpoint_control import momentum_dumping, wheel_allocation
-from sunpoint_control.momentum_dumping import add_dumping, rod_dipoles, rod_torque
+from sunpoint_control.momentum_dumping import add_dumping
+from sunpoint_control.torque_rods import rod_dipoles, rod_torque
 
 AXES = np.asarray(okeefe_values(WHEELS).wheels.axes)
 component = st.floats(-1.0, 1.0)
@@ -26,7 +27,7 @@ def parameters(**changes):
 
 
 def dump(p, wheels, speeds, field_b, torques=(0.0, 0.0, 0.0, 0.0)):
-    torques, dipoles = np.array(torques), np.full(len(p.rod_axes_b), np.nan)
+    torques, dipoles = np.array(torques), np.full(len(p.rods.axes_b), np.nan)
     result = add_dumping(p, wheels, np.array(speeds), field_b, torques, dipoles)
     return torques, dipoles, result
 
@@ -94,6 +95,21 @@ def test_wheels_come_to_their_reference_speed_under_a_turning_field(reference_rp
     # the common speed of all four wheels carries no momentum and is despun without the rods
     assert np.abs(AXES.T @ (speeds - reference)).max() < 0.01 * start
     assert np.abs(speeds - reference).max() < 2.0
+
+
+def test_wheels_come_to_the_momentum_that_they_shall_keep():
+    """A bias as a vector in b, beside a speed that all wheels have in common."""
+    bias = np.array((0.02, -0.01, 0.03))
+    p, wheels = parameters(dumping__momentum=bias.tolist(), dumping__reference_speed_rpm=100.0)
+    speeds = np.array([150.0, -80.0, 60.0, -30.0])
+    for t in np.arange(0.0, 20_000.0, 5.0):
+        phase = 2.0 * np.pi * t / 5550.0
+        field_b = (2e-5 * np.cos(phase), 3e-5 * np.sin(phase), 2e-5 * np.sin(2.0 * phase))
+        torques, _, _ = dump(p, wheels, speeds, field_b)
+        speeds = speeds + 5.0 * torques / p.wheel_inertia
+    common = 100.0 * np.pi / 30.0
+    np.testing.assert_allclose(p.wheel_inertia * AXES.T @ (speeds - common), bias, atol=0.01 * 0.05)
+    np.testing.assert_allclose(speeds, common + np.linalg.pinv(AXES.T) @ bias / p.wheel_inertia, atol=2.0)
 
 
 def test_without_field_there_is_no_dumping():

@@ -14,7 +14,15 @@ from css_common.attitude import mrp_rate, mrp_shadow, mrp_to_dcm
 from css_common.sections import SPACECRAFT
 from css_common.vectors import cross, dot, multiply, norm, unit
 from sunpoint_control import mrp_sun_pointing
-from sunpoint_control.mrp_sun_pointing import damping_torque, error_mrp, integrate_error, pointing_torque
+from sunpoint_control.mrp_sun_pointing import (
+    Reference,
+    damping_torque,
+    error_mrp,
+    integrate_error,
+    pointing_torque,
+    spin_reference,
+    tracking_torque,
+)
 
 INERTIA = np.diag((10.5, 8.0, 6.75))
 Z = (0.0, 0.0, 1.0)
@@ -83,6 +91,77 @@ def test_law_is_equation_18():
     torque_b, z_out = pointing_torque(p, sigma, omega, integral, h)
     np.testing.assert_allclose(torque_b, -gs_us, rtol=1e-12)
     np.testing.assert_allclose(z_out, z, rtol=1e-12)
+
+
+def test_law_is_equation_18_for_a_reference_that_turns():
+    """All terms, in matrices: reference rate, its acceleration, a known torque."""
+    p = parameters(gains__ki=0.02, reference__known_torque=[1e-3, -2e-3, 5e-4])
+    sigma, omega, integral, h = (0.1, -0.2, 0.05), (0.02, 0.01, -0.03), (1.0, -2.0, 0.5), (0.3, -0.1, 0.2)
+    omega_r, acceleration = np.array((0.03, -0.01, 0.02)), np.array((1e-3, 2e-3, -1e-3))
+    reference = Reference(tuple(omega_r.tolist()), tuple(acceleration.tolist()), p.known_torque_b, False)
+    relative = omega - omega_r
+    z = np.add(integral, INERTIA @ relative)
+    kz = 0.02 * z
+    gs_us = (
+        -INERTIA @ (acceleration - np.cross(omega, omega_r))
+        + 0.148 * np.array(sigma)
+        + 0.9 * relative
+        + 0.9 * kz
+        - np.cross(omega_r - kz, INERTIA @ omega + h)
+        + np.array(p.known_torque_b)
+    )
+    torque_b, z_out = tracking_torque(p, sigma, omega, integral, h, reference)
+    np.testing.assert_allclose(torque_b, -gs_us, rtol=1e-12)
+    np.testing.assert_allclose(z_out, z, rtol=1e-12)
+
+
+def test_a_reference_at_rest_gives_the_same_bits():
+    p = parameters()
+    sigma, omega, integral, h = (0.1, -0.0, 0.05), (-0.0, 0.01, -0.03), (0.0, -2.0, 0.5), (0.3, -0.1, -0.0)
+    reference, spin = spin_reference(p, (0.6, 0.0, -0.8), 0.0, 0.1)
+    assert reference.at_rest and spin == 0.0
+    general = tracking_torque(p, sigma, omega, integral, h, reference)
+    assert np.array(general).tobytes() == np.array(pointing_torque(p, sigma, omega, integral, h)).tobytes()
+
+
+def test_the_spin_of_the_reference_grows_as_it_is_told():
+    p = parameters(reference__spin_deg_s=-2.0, reference__acceleration_deg_s2=0.5)
+    spin, speeds = 0.0, []
+    for _ in range(60):
+        reference, spin = spin_reference(p, (0.0, 0.6, 0.8), spin, 0.1)
+        np.testing.assert_allclose(reference.omega_rn_b, np.multiply(spin, (0.0, 0.6, 0.8)))
+        speeds.append(math.degrees(spin))
+        growing = -0.5 if len(speeds) <= 40 else 0.0
+        expected = np.multiply(math.radians(growing), (0.0, 0.6, 0.8))
+        np.testing.assert_allclose(reference.acceleration_b, expected, atol=1e-12)
+    np.testing.assert_allclose(speeds, np.maximum(-0.05 * np.arange(1, 61), -2.0), rtol=1e-9)
+    assert spin_reference(parameters(reference__spin_deg_s=1.0), Z, 0.0, 0.1)[1] == pytest.approx(math.radians(1.0))
+
+
+def test_a_spin_about_the_sun_line_is_followed_without_error():
+    """The feedforward carries the gyroscopic load of body and wheels: no offset is left for the integral."""
+    p = parameters(gains__ki=0.0, reference__spin_deg_s=2.0, reference__acceleration_deg_s2=0.1)
+    sun_n, spin_rate = np.array((0.0, 0.6, 0.8)), math.radians(2.0)
+
+    def derivative(t, y):
+        sigma, omega, h = (tuple(y[i : i + 3].tolist()) for i in (0, 3, 6))
+        sun_b = tuple((np.array(mrp_to_dcm(sigma)) @ sun_n).tolist())
+        acceleration = math.radians(0.1) if t < 20.0 else 0.0
+        reference = Reference(
+            tuple(min(math.radians(0.1) * t, spin_rate) * c for c in sun_b),
+            tuple(acceleration * c for c in sun_b), (0.0, 0.0, 0.0), False,
+        )  # fmt: skip
+        error, _ = error_mrp(sun_b, Z)
+        torque_b, _ = tracking_torque(p, error, omega, (0.0, 0.0, 0.0), h, reference)
+        total = INERTIA @ omega + h
+        omega_dot = np.linalg.solve(INERTIA, torque_b - np.cross(omega, total))
+        return np.concatenate((mrp_rate(sigma, omega), omega_dot, np.negative(torque_b)))
+
+    start = np.concatenate(((0.1, 0.05, -0.1), (0.0, 0.0, 0.0), (0.2, -0.3, 0.1)))
+    flown = solve_ivp(derivative, (0.0, 400.0), start, rtol=1e-8, atol=1e-10, max_step=1.0).y[:, -1]
+    sun_b = np.array(mrp_to_dcm(tuple(flown[:3].tolist()))) @ sun_n
+    assert math.acos(min(1.0, sun_b[2])) < 1e-5
+    np.testing.assert_allclose(flown[3:6], (0.0, 0.0, spin_rate), atol=1e-6)
 
 
 def fly(p, sigma0, omega0, duration, momentum0=(0.0, 0.0, 0.0)):

@@ -14,6 +14,7 @@ from css_common.attitude import mrp_rate, mrp_shadow, mrp_to_dcm
 from css_common.sections import RODS, SPACECRAFT, WHEELS
 from css_common.vectors import angle_between, multiply
 from sunpoint_control import sun_pointing_control as control
+from sunpoint_control.held_field import HeldField
 from sunpoint_control.modes import MODE_ECLIPSE, MODE_SAFE, MODE_SUN_ACQUISITION, MODE_SUN_POINT, MODE_SUN_SEARCH
 
 TABLE = SPACECRAFT + WHEELS + RODS + control.PARAMETERS
@@ -42,7 +43,7 @@ class Cycle:
     ):  # fmt: skip
         self.state, output = control.step(
             self.p, self.state, dt, sun_b, validity, eclipse, omega, source,
-            np.array(speeds, dtype=np.float64), field, field_valid, self.torques, self.dipoles,
+            np.array(speeds, dtype=np.float64), HeldField(field, field_valid, field_valid), self.torques, self.dipoles,
         )  # fmt: skip
         return output
 

@@ -21,6 +21,7 @@ from css_monte_carlo.mission_parts import measured_estimators
 from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
+from css_monte_carlo.study_criteria import judge, refuse_unknown_criteria
 from css_monte_carlo.study_summary import study_object, summaries_of
 
 
@@ -34,6 +35,8 @@ def run(options: argparse.Namespace) -> int:
         overrides.append(f"mission.seed={options.seed}")
     mission = load_mission(options.mission, overrides)
     configurations = _configurations(mission, options)
+    if mission.values.measures.required_share > 0.0:
+        refuse_unknown_criteria(mission)
     for remark in mission.remarks:
         print(f"monte-carlo: {remark}", file=sys.stderr)
     folder = options.out or _default_folder(mission.name)
@@ -55,9 +58,14 @@ def run(options: argparse.Namespace) -> int:
         )
     result = study_object(study, time.perf_counter() - begin, time.process_time())
     print_study(study, result, Console(highlight=False))
+    judged = judge(study)
+    for line in itertools.chain.from_iterable(configuration.lines() for configuration in judged):
+        print(line)
+    if judged:
+        result["criteria"] = [configuration.as_object() for configuration in judged]
     if options.json:
         print(json.dumps(result, allow_nan=False))
-    return 0
+    return 0 if all(configuration.passed for configuration in judged) else 1
 
 
 def _refuse_bad_numbers(options: argparse.Namespace) -> None:

@@ -15,7 +15,7 @@ from css_common.run import node_main
 from css_common.schema import Values, flag, integer
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
 from css_sim import disturbances, flight_environment, initial_conditions
-from css_sim.flight_checks import check_rate, plant_findings
+from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
 
@@ -77,6 +77,10 @@ class Dynamics(Plant):
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return plant_findings(node, graph)
+
+    @classmethod
+    def fastest_start(cls, values: Values) -> float:
+        return fastest_start(values)
 
     def configure(self) -> None:
         values = self.values

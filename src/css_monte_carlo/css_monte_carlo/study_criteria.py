@@ -1,0 +1,96 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The pass criteria of a mission over the cases of a study: how many meet all of them, and whether that is enough.
+
+A mission that says `measures.required_share` has its criteria judge studies too. A case meets a criterion as a flight
+does: within its limits, both included; a quantity without a value meets none.
+"""
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import pyarrow as pa
+
+from css_analysis.quantities import QUANTITIES
+from css_common.mission import SHARED, Mission, MissionError, mission_from_text
+from css_common.schema import unknown_name
+from css_monte_carlo.study import Study
+from css_monte_carlo.study_summary import rows_of
+
+_NAMED = 5  # cases that a line names
+
+
+class Judged(NamedTuple):
+    """One configuration of a study under the criteria."""
+
+    labels: dict[str, Any]  # estimator, gyro, overrides
+    cases: int
+    met: int  # cases that meet all criteria
+    required: int  # cases that must
+    missed: dict[str, list[int]]  # criterion as QUANTITY.min or QUANTITY.max: numbers of the cases that miss it
+
+    @property
+    def passed(self) -> bool:
+        """Enough cases meet the criteria."""
+        return self.met >= self.required
+
+    def lines(self) -> list[str]:
+        """PASS or FAIL, and which criteria are missed by which cases."""
+        name = " ".join(filter(None, (self.labels["estimator"], self.labels["overrides"])))
+        word = "PASS" if self.passed else "FAIL"
+        lines = [f"{word}  {self.met} of {self.cases} cases meet the criteria, must be {self.required}  ({name})"]
+        for criterion, numbers in self.missed.items():
+            if numbers:
+                shown = ", ".join(map(str, numbers[:_NAMED])) + (", ..." if len(numbers) > _NAMED else "")
+                lines.append(f"      {criterion} is missed by {len(numbers)}: case {shown}")
+        return lines
+
+    def as_object(self) -> dict[str, Any]:
+        """What `--json` says."""
+        return {"met": self.met, "required": self.required, "missed": {k: len(v) for k, v in self.missed.items()}}
+
+
+def refuse_unknown_criteria(mission: Mission) -> None:
+    """Looks at the names of the criteria before a study that they will judge.
+
+    Raises:
+        MissionError: there is no such quantity.
+    """
+    for quantity in mission.criteria:
+        if quantity not in QUANTITIES:
+            raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
+
+
+def judge(study: Study) -> list[Judged]:
+    """Every configuration under the criteria of the study's mission; none where these judge flights alone."""
+    mission = mission_from_text(study.manifest["mission_text"], str(study.folder))
+    share = mission.values.measures.required_share
+    if share == 0.0 or not mission.criteria:
+        return []
+    return [
+        _judged(labels, rows_of(study.cases, **labels), mission.criteria, share)
+        for labels in study.manifest["configurations"]
+    ]
+
+
+def _judged(
+    labels: dict[str, Any], rows: pa.Table, criteria: Mapping[str, Mapping[str, float]], share: float
+) -> Judged:
+    numbers = rows["case"].to_numpy()
+    met = np.ones(len(numbers), dtype=bool)
+    missed: dict[str, list[int]] = {}
+    for quantity, limits in criteria.items():
+        values = _values(rows, QUANTITIES[quantity].study_column)
+        for bound, limit in limits.items():
+            good = values >= limit if bound == "min" else values <= limit
+            missed[f"{quantity}.{bound} {limit:g}"] = numbers[~good].tolist()
+            met &= good
+    required = int(np.ceil(share * len(numbers) - 1e-9))
+    return Judged(labels, len(numbers), int(np.count_nonzero(met)), required, missed)
+
+
+def _values(rows: pa.Table, column: str) -> np.ndarray:
+    """(C,) values of a column, NaN for none and for a quantity that the study does not measure."""
+    if column not in rows.column_names:
+        return np.full(rows.num_rows, np.nan)
+    return rows[column].cast(pa.float64()).to_numpy()
