@@ -109,7 +109,9 @@ class Flight:
         light = np.zeros(14) if dark else outputs(self.sun_b)
         aiding = UNAIDED._replace(gyro_b=omega, gyro_valid=gyro, field_b=field_b or self.field_b, field_valid=measured)
         predicted = PREDICTION_ECLIPSED if dark else PREDICTION_SUNLIT
-        self.state, heading = SWITCH.step(self.p, self.state, None, DT, light, aiding._replace(sky=UNKNOWN_SKY._replace(predicted=predicted)))
+        self.state, heading = SWITCH.step(
+            self.p, self.state, None, DT, light, aiding._replace(sky=UNKNOWN_SKY._replace(predicted=predicted))
+        )
         return heading
 
     def fly(self, seconds, **conditions):

@@ -13,8 +13,8 @@ import numpy as np
 from css_common.epochs import parse_utc
 from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
-from css_environment import ephemeris
 from css_common.vectors import Vec3
+from css_environment import ephemeris
 from css_environment.albedo_vector import PATCHES, earth_light_sources
 from css_environment.earth_light import EarthView, gather_light, look_at_earth, new_earth_view, new_light
 from css_environment.ephemeris import EnvironmentState, Ephemeris

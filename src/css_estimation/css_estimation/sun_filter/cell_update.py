@@ -98,8 +98,17 @@ def view_of(p: SunFilterParameters, i: int, sun_b: Vec3, margin: float) -> tuple
 
 @kernel
 def read_cells(
-    p: SunFilterParameters, voltages, sun_n: Vec3, flux: float, earth_known: bool, light, states: int, x, covariance,
-    earth, work,
+    p: SunFilterParameters,
+    voltages,
+    sun_n: Vec3,
+    flux: float,
+    earth_known: bool,
+    light,
+    states: int,
+    x,
+    covariance,
+    earth,
+    work,
 ) -> CellReading:
     """Updates an estimate with all cells.
 

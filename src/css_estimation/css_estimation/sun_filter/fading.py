@@ -33,9 +33,7 @@ def part_of_expected(p: SunFilterParameters, x, sun_n: Vec3, flux: float, voltag
 
 
 @kernel
-def fading(
-    p: SunFilterParameters, x, covariance, sun_n: Vec3, flux: float, voltages, faded: float, dt: float
-) -> float:
+def fading(p: SunFilterParameters, x, covariance, sun_n: Vec3, flux: float, voltages, faded: float, dt: float) -> float:
     """How long [s] outputs have been too low, 0 while they are as expected.
 
     What lasts is taken for another intensity, of which the filter then learns.

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """How attitude and rate of the Sun filter go on from one cycle to the next, by the best source of the rate there is.
 
-    RATE_BY_GYRO       the gyro's rate less its bias, which is estimated
-    RATE_BY_MOMENTUM   angular momentum H in b is conserved but for unknown torques: w = J^-1 (H - h), with the momentum
-                       h of the wheels relative to the body by their measured speeds, J with their spin inertia (Schaub &
-                       Junkins, section 4.5). H turns with -w and stays what it is in n; so the rate is known in the dark.
-    RATE_BY_WALK       nothing tells: the rate is that of the last cycle, and wanders. It is the former with J = 1, h = 0.
+RATE_BY_GYRO       the gyro's rate less its bias, which is estimated
+RATE_BY_MOMENTUM   angular momentum H in b is conserved but for unknown torques: w = J^-1 (H - h), with the momentum
+                   h of the wheels relative to the body by their measured speeds, J with their spin inertia (Schaub &
+                   Junkins, section 4.5). H turns with -w and stays what it is in n; so the rate is known in the dark.
+RATE_BY_WALK       nothing tells: the rate is that of the last cycle, and wanders. It is the former with J = 1, h = 0.
 """
 
 import math

@@ -112,12 +112,8 @@ class CellErrors(NamedTuple):
     scale: float = made(
         square, real("scale_sigma", 0.02, "-", "slow error of the output common to all cells, 1 sigma", high=1.0)
     )
-    scale_time: float = given(
-        real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9)
-    )
-    gain: float = made(
-        square, real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", high=1.0)
-    )
+    scale_time: float = given(real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9))
+    gain: float = made(square, real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", high=1.0))
     tilt: float = made(
         lambda degrees: math.radians(degrees) ** 2,
         real("tilt_sigma_deg", 0.1, "deg", "lasting error of each cell's normal about an axis, 1 sigma", high=45.0),
@@ -139,7 +135,9 @@ class EarthErrors(NamedTuple):
         real("albedo.unknown", 0.1, "-", "light of an Earth that is not predicted, on one cell", low=0.0, high=1.0)
     )
     largest: float = given(
-        real("albedo.largest", 0.3, "-", "light beyond the predicted that no Earth throws on a cell", low=0.01, high=2.0)
+        real(
+            "albedo.largest", 0.3, "-", "light beyond the predicted that no Earth throws on a cell", low=0.01, high=2.0
+        )
     )
     unknown_heading: float = made(
         lambda degrees: math.radians(degrees) ** 2,
@@ -213,16 +211,30 @@ class Convergence(NamedTuple):
     )
     search_variance: float = made(
         lambda degrees: math.radians(degrees) ** 2,
-        real("search.until_deg", 20.0, "deg", "spread at which the search for the Sun ends, 1 sigma", low=1.0, high=60.0),
+        real(
+            "search.until_deg", 20.0, "deg", "spread at which the search for the Sun ends, 1 sigma", low=1.0, high=60.0
+        ),
     )
     roll_variance: float = made(
         lambda degrees: math.radians(degrees) ** 2,
-        real("roll.from_deg", 4.0, "deg", "error of the heading at which roll is looked for, 1 sigma", low=0.1, high=45.0),
+        real(
+            "roll.from_deg", 4.0, "deg", "error of the heading at which roll is looked for, 1 sigma", low=0.1, high=45.0
+        ),
     )
     longest_step: float = given(
-        real("longest_step", 10.0, "s", "after a longer step the Sun is looked for anew", low=0.0, open_low=True, high=1e6)
+        real(
+            "longest_step",
+            10.0,
+            "s",
+            "after a longer step the Sun is looked for anew",
+            low=0.0,
+            open_low=True,
+            high=1e6,
+        )
     )
-    gate: float = given(real("gate", 25.0, "-", "normalised innovation squared beyond which a cell is refused", low=1.0, high=1e6))
+    gate: float = given(
+        real("gate", 25.0, "-", "normalised innovation squared beyond which a cell is refused", low=1.0, high=1e6)
+    )
 
 
 class SunFilterParameters(NamedTuple):

@@ -200,6 +200,17 @@ def _brightest(p: SunFilterParameters, voltages) -> float:
 
 
 @kernel
+def _readable(voltages) -> int:
+    """Mask of the outputs that are readings."""
+    mask = 0
+    for i in range(voltages.shape[0]):
+        # a NaN compares false
+        if abs(voltages[i]) < READABLE:
+            mask |= 1 << i
+    return mask
+
+
+@kernel
 def _sunlight(p: SunFilterParameters, aiding: Aiding, largest: float) -> tuple[float, bool]:
     """Sunlight to reckon with, 1 at 1 AU, and whether cells may be used: lit, and the whole disc in view."""
     lit = largest > p.convergence.minimum_output
@@ -291,9 +302,7 @@ def _forget_slowly(p: SunFilterParameters, dt: float, states: int, x, covariance
 
 
 @kernel
-def _lost(
-    p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3, flux: float, voltages
-) -> bool:
+def _lost(p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3, flux: float, voltages) -> bool:
     """Whether an estimate has to be dropped."""
     if not sigma < _LOST:
         return True
@@ -412,6 +421,8 @@ def step(
         progress, rate, found = _search(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = found.sun_b, _across(found.sun_b, min(found.variance, _MOST))
         mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
+        if lit:
+            reading = CellReading(0.0, 0, _readable(voltages), 0, 0, 0.0, 0.0)
         rate_source = RATE_GYRO if cycle.model == RATE_BY_GYRO else RATE_NONE
     else:
         progress, rate, reading, best, mode = _track(p, state, memory, cycle, voltages, aiding)
