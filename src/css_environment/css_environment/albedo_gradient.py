@@ -4,7 +4,7 @@
 The sum is that of `albedo.albedo_output`, patch by patch and cut at the same edges. A cell's output depends on attitude
 through its normal alone, but for the screen: where that cuts a patch, what the cut takes away changes with attitude
 too, which is left out of the gradient. Values agree with `albedo_output` to single precision but where a screen cuts a
-patch: what the cut moves is left out as well, at most 0.003 of full scale.
+patch: what the cut moves is left out as well, at most 0.005 of full scale.
 """
 
 import math

@@ -8,9 +8,9 @@ The model of cell i with the normal n_i,
 R being the response, a_i the light of the mean Earth at the estimated attitude, u_i what clouds add to it in units of
 c a_i. Where the Earth is not predicted a_i is half of its largest, and its error is white noise.
 
-Which cells see the Sun follows from the estimate. Its error decides for which of them that is sure: the others, next to
-the edge of a view, are left out, since a linear filter cannot use a step. A reading that the model explains worse than
-`gate` allows is refused.
+Which cells see the Sun follows from the estimate. Its error decides for which of them that is sure: of the others, next
+to the edge of a view, those enter that are too bright for an Earth. A reading that the model explains worse than `gate`
+allows is refused.
 
 Updates are scalar, in sequence, in symmetric form: of the covariance S >= R > 0 is taken what the reading took away.
 """
@@ -48,8 +48,9 @@ READABLE = 1e3
 _MARGIN_LEAST, _MARGIN_BY_SIGMA, _MARGIN_MOST = 0.03, 2.0, 0.15
 # A step in the output smaller than this is none.
 _SMALLEST_STEP = 0.05
-# Below so many standard deviations of noise, model and reading, a cell is dark and says nothing.
-_DARK = 3.0
+# Below so many standard deviations of noise a cell that does not see the Sun is dark and says nothing. That is decided by what is expected: to
+# decide by the reading would keep the high ones of a dim cell alone. A reading so much higher cannot be noise.
+_DARK, _SURELY_LIT = 3.0, 4.0
 # Without a converged heading nothing is refused [rad].
 _CONVERGED = 0.3
 # Corrections longer than this [rad] are cut.
@@ -102,6 +103,7 @@ def read_cells(
     voltages,
     sun_n: Vec3,
     flux: float,
+    more_noise: float,
     earth_known: bool,
     light,
     states: int,
@@ -114,6 +116,7 @@ def read_cells(
 
     Args:
         flux: of the Sun [-], 1 at 1 AU.
+        more_noise: variance of each cell [-] beside that of its noise.
         earth_known: `light` is that of the Earth; else it is unknown.
         states: how many of the states are in use.
         earth, work: room, of `SunFilterMemory`.
@@ -142,10 +145,14 @@ def read_cells(
         cell = p.cells[i]
         v -= cell.dark
         cosine, seen, doubtful = view_of(p, i, sun_b, margin)
-        if doubtful:
-            continue
         mean_light = earth[i, 0] if earth_known else 0.0
         albedo = earth_factor * mean_light if earth_known else 0.5 * p.earth.unknown
+        if doubtful:
+            # the reading tells on which side of the edge the Sun is, where no Earth could
+            sunlight = flux * max(cosine, p.cos_half_view)
+            seen = sunlight > p.earth.largest and v > cell.gain * scale_now * (albedo + 0.5 * sunlight)
+            if not seen:
+                continue
         cloud = p.earth.clouds * mean_light
         cloud_state = GAIN + cells + i
         received = albedo + (cloud * x[X_GAIN + cells + i] if earth_known else 0.0)
@@ -154,7 +161,7 @@ def read_cells(
         output, slope = respond(p.response, received)
         factor = cell.gain * (1.0 + x[X_GAIN + i])
         expected = factor * scale_now * output
-        if expected < dark and v < dark:
+        if not seen and expected < dark and v < _SURELY_LIT * dark:
             continue
         if not earth_known and not seen and v < p.earth.largest * flux:
             continue
@@ -176,9 +183,7 @@ def read_cells(
         innovation -= by_scale * correction[SCALE] + expected * correction[COMMON] + by_gain * correction[GAIN + i]
         if earth_known:
             innovation -= by_earth * correction[EARTH] + by_cloud * correction[cloud_state]
-        noise = p.errors.noise
-        if not earth_known:
-            noise += p.earth.unknown * p.earth.unknown
+        noise = p.errors.noise + more_noise
         for j in range(states):
             total = by_theta[0] * covariance[j, 0] + by_theta[1] * covariance[j, 1] + by_theta[2] * covariance[j, 2]
             total += by_scale * covariance[j, SCALE] + expected * covariance[j, COMMON]

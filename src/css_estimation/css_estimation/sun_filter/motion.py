@@ -21,6 +21,8 @@ from css_estimation.sun_filter.options import Motion
 RATE_BY_GYRO, RATE_BY_MOMENTUM, RATE_BY_WALK = 0, 1, 2
 
 _FASTEST_WHEEL = 1e5  # [rad/s]
+# Time [s] for which an error of the rate makes the same gyroscopic torque.
+_SAME_TORQUE = 5.0
 # Rounding of many turns; keeps the covariance positive.
 _TURN_NOISE = 1e-14  # [rad2/s]
 
@@ -86,6 +88,18 @@ def begin_rate(p: Motion, model: int, omega_bn_b: Vec3, variance: float, wheels_
 
 
 @kernel
+def _rate_variance(inverse: Mat3, covariance) -> float:
+    """Sum of the variances of the rate [rad2/s2] about three axes, of J^-1 P J^-1."""
+    total = 0.0
+    for i in range(3):
+        row = inverse[i]
+        for j in range(3):
+            for k in range(3):
+                total += row[j] * covariance[RATE + j, RATE + k] * row[k]
+    return total
+
+
+@kernel
 def change_rate(p: Motion, before: int, after: int, omega_bn_b: Vec3, wheels_b: Vec3, x, covariance) -> None:
     """Goes over to another source of the rate, with the rate of the last cycle [rad/s].
 
@@ -135,7 +149,11 @@ def go_on(p: Motion, model: int, gyro_b: Vec3, wheels_b: Vec3, dt: float, states
         by_rate = scaled(dt, matmul(transpose(dcm_bn), inverse))
         x[X_RATE], x[X_RATE + 1], x[X_RATE + 2] = multiply(turn, momentum_b)
         attitude_noise = 0.0
-        rate_noise = (p.torque if model == RATE_BY_MOMENTUM else p.acceleration) * dt
+        rate_noise = p.acceleration * dt
+        if model == RATE_BY_MOMENTUM:
+            # what is left out of the linear model, dw x J dw: it matters while the rate is little known
+            neglected = 0.5 * p.anisotropy * _rate_variance(inverse, covariance)
+            rate_noise = (p.torque + neglected * neglected * _SAME_TORQUE) * dt
     set_dcm(x, matmul(turn, dcm_bn))
     for j in range(states):
         rate = covariance[RATE, j], covariance[RATE + 1, j], covariance[RATE + 2, j]

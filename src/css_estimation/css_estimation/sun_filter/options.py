@@ -88,6 +88,11 @@ def _inertia(values: Values) -> Mat3:
     return mat3(body + (values.wheels.inertia * axes.T @ axes if values.wheels.fitted else 0.0))
 
 
+def _anisotropy(values: Values) -> float:
+    moments = np.linalg.eigvalsh(np.array(_inertia(values)))
+    return float(moments[-1] - moments[0])
+
+
 def _inverse_inertia(values: Values) -> Mat3:
     return mat3(np.linalg.inv(np.array(_inertia(values))))
 
@@ -168,6 +173,7 @@ class Motion(NamedTuple):
 
     inertia: Mat3 = computed(_inertia)  # [kg m2]
     inverse_inertia: Mat3 = computed(_inverse_inertia)
+    anisotropy: float = computed(_anisotropy)  # [kg m2] largest less smallest principal moment
     wheels: np.ndarray = computed(_wheels)  # (N,) of WHEEL
     has_wheels: bool = computed(_has_wheels)
     knows_momentum: bool = computed(_knows_momentum, USE_WHEELS)

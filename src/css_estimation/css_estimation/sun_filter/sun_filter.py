@@ -93,6 +93,7 @@ _CONTRARY_SHARE = 0.4
 _BETTER = 6.0
 _LOST = 1.0  # [rad] error of the heading beyond which there is no estimate
 _FULL_DISC = 0.99
+_FIRST_NOISE, _FIRST_TIME = 0.1, 3.0  # [-], [s]
 _CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told to fade
 _MOST = 4.0  # [rad2] reported variance
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
@@ -302,6 +303,12 @@ def _forget_slowly(p: SunFilterParameters, dt: float, states: int, x, covariance
 
 
 @kernel
+def _start_noise(since: float) -> float:
+    """Variance of outputs [-] by what a linear filter makes of large corrections, which come first [s]."""
+    return (_FIRST_NOISE * math.exp(-since / _FIRST_TIME)) ** 2
+
+
+@kernel
 def _lost(p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3, flux: float, voltages) -> bool:
     """Whether an estimate has to be dropped."""
     if not sigma < _LOST:
@@ -340,6 +347,7 @@ def _track(
         faded = fading(p, best_x, best_covariance, sun_n, cycle.flux, voltages, faded, dt)
         use = faded == 0.0
     if use:
+        more_noise = 0.0 if earth_known else p.earth.unknown**2 + _start_noise(before.since)
         for k in range(HYPOTHESES):
             if memory.weights[k] <= DEAD:
                 continue
@@ -347,7 +355,7 @@ def _track(
             if earth_known:
                 loosen_roll(covariance, sun_n, before.since, dt)
             read = read_cells(
-                p, voltages, sun_n, cycle.flux, earth_known, aiding.sky.light, states, x, covariance, memory.earth,
+                p, voltages, sun_n, cycle.flux, more_noise, earth_known, aiding.sky.light, states, x, covariance, memory.earth,
                 memory.work,
             )  # fmt: skip
             weigh(memory, k, read.likelihood)

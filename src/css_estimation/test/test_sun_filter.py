@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Sun filter on layouts, in dusk and dark, with broken cells, and whether its error bars are true."""
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+from cell_layouts import LAYOUTS
+from sun_filter_flight import SunFilterFlight
+
+from css_common.vectors import unit
+from css_estimation.sun.sun_heading import (
+    RATE_GYRO,
+    RATE_MOMENTUM,
+    RATE_SUN,
+    UNAIDED,
+    VALIDITY_HELD,
+    VALIDITY_VALID,
+)
+from css_estimation.sun_filter import sun_filter
+
+SIX = LAYOUTS["six_faces"]
+TURNING = (0.004, -0.003, 0.002)
+# the Earth disturbs nothing here: its error bars would hide what is tested
+EXACT = {
+    "noise": 0.02,
+    "common_noise": 0.0,
+    "scale_sigma": 0.0,
+    "gain_sigma": 0.0,
+    "tilt_sigma_deg": 0.0,
+}
+NO_EARTH = {"albedo__unknown": 0.0, "albedo__unknown_heading_deg": 0.0}
+
+
+def directions(count):
+    dice = np.random.default_rng(7).normal(size=(count, 3))
+    return [unit(tuple(d)) for d in dice]
+
+
+def sees_three_axes(flight):
+    """Whether the cells that are lit look along three independent directions."""
+    cells = flight.p.cells[flight.voltages() > 0.35]
+    normals = np.column_stack([cells["nx"], cells["ny"], cells["nz"]])
+    return len(cells) >= 3 and np.linalg.svd(normals)[1][2] > 0.3
+
+
+@pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
+def test_six_faces_at_rest_find_a_sun_that_lights_three(gyro):
+    """A gate relative to the brightest drops the two dim ones and stays 26 deg off."""
+    flight = SunFilterFlight(unit((0.3, 0.316, 0.9)), **SIX, **NO_EARTH)
+    heading = flight.fly(30.0, gyro=gyro)
+    assert heading.validity == VALIDITY_VALID
+    assert flight.error_deg(heading) < 0.05
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_the_sun_is_found_from_anywhere_that_three_cells_see(layout):
+    found = 0
+    for seed, sun_b in enumerate(directions(25)):
+        flight = SunFilterFlight(sun_b, TURNING, seed, white=0.005, **LAYOUTS[layout], **NO_EARTH)
+        if sees_three_axes(flight):
+            assert flight.error_deg(flight.fly(60.0)) < 1.0
+            found += 1
+    assert found > 0 or layout == "four_coplanar"
+
+
+@pytest.mark.parametrize("layout", ["dual_pyramid", "six_faces", "clark"])
+def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_error_bar(layout):
+    errors = []
+    for known in (True, False):
+        flight = SunFilterFlight(unit((0.5, 0.4, 0.77)), TURNING, white=0.005, earth=(0.3, 0.9, 0.2), **LAYOUTS[layout])
+        if not known:
+            flight.sky = flight.sky._replace(known=False)
+            voltages = flight.voltages
+            flight.voltages = partial(_with_earth, flight, voltages)
+        heading = flight.fly(200.0, gyro=True)
+        errors.append(flight.error_deg(heading))
+    assert heading.mode == sun_filter.MODE_NO_EARTH
+    sigma_deg = math.degrees(math.sqrt(np.trace(np.reshape(heading.covariance, (3, 3))) / 2.0))
+    assert 1.0 < sigma_deg and errors[1] < 3.0 * sigma_deg
+    assert errors[0] < min(1.2, 0.6 * errors[1])
+
+
+def _with_earth(flight, voltages, part=1.0):
+    flight.sky = flight.sky._replace(known=True)
+    outputs = voltages(part)
+    flight.sky = flight.sky._replace(known=False)
+    return outputs
+
+
+@pytest.mark.parametrize("reading", [0.5, 1.0, 1.4, 3.0, 16.0, -2.0, math.nan, math.inf, 1e300])
+def test_one_broken_cell_on_the_dark_side_is_refused(reading):
+    flight = SunFilterFlight(unit((0.1, 0.2, 0.97)), TURNING, white=0.002, **NO_EARTH)
+    flight.fly(20.0)
+
+    def broken(voltages):
+        voltages[6] = reading
+
+    worst = 0.0
+    for _ in range(300):
+        heading = flight.step(change=broken)
+        worst = max(worst, flight.error_deg(heading))
+        assert not heading.lit_mask >> 6 & 1
+    assert heading.validity == VALIDITY_VALID
+    assert worst < 1.0
+
+
+def test_one_cell_broken_from_the_start_does_not_hide_the_sun():
+    flight = SunFilterFlight(unit((0.1, 0.2, 0.97)), TURNING, white=0.002, **NO_EARTH)
+
+    def broken(voltages):
+        voltages[6] = 0.5
+
+    assert flight.error_deg(flight.fly(60.0, change=broken)) < 1.0
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["orbit", "no orbit"])
+def test_dusk_is_no_turn(known):
+    """Outputs that fade together leave direction and rate alone; the dark then holds them by angular momentum."""
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
+    if known:
+        flight.sky = flight.sky._replace(known=True, sun_n=flight.sun_n)
+    flight.fly(200.0)
+    worst = 0.0
+    for part in np.linspace(1.0, 0.0, 82):
+        heading = flight.step(part=float(part))
+        worst = max(worst, flight.error_deg(heading))
+    heading = flight.fly(600.0, part=0.0)
+    assert worst < 0.3
+    assert (heading.validity, heading.mode) == (VALIDITY_HELD, sun_filter.MODE_COASTING)
+    assert heading.rate_source == RATE_MOMENTUM
+    # the orbit says when the penumbra begins; without it the first tenth of the fading is taken for a turn
+    assert flight.error_deg(heading) < (1.0 if known else 2.0)
+    assert np.degrees(np.linalg.norm(np.subtract(heading.omega_bn_b, flight.omega))) < 0.01
+    heading = flight.fly(60.0)
+    assert heading.validity == VALIDITY_VALID
+    assert flight.error_deg(heading) < 0.5
+
+
+def test_in_the_dark_a_change_of_the_wheels_is_a_change_of_the_rate():
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
+    flight.fly(200.0)
+    for _ in range(100):
+        flight.wheels_b = flight.wheels_b + np.array([2e-4, -1e-4, 3e-4])
+        heading = flight.step(part=0.0)
+    assert np.degrees(np.linalg.norm(np.subtract(heading.omega_bn_b, flight.omega))) < 0.01
+    assert np.degrees(np.linalg.norm(flight.omega)) > 0.15
+    heading = flight.fly(100.0, part=0.0)
+    assert flight.error_deg(heading) < 1.0
+
+
+def test_without_gyro_and_wheels_the_dark_is_not_said_to_be_known():
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
+    flight.fly(200.0, wheels=False)
+    heading = flight.fly(20.0, part=0.0, wheels=False)
+    sigma_deg = math.degrees(math.sqrt(np.trace(np.reshape(heading.covariance, (3, 3))) / 2.0))
+    assert sigma_deg > 3.0 and flight.error_deg(heading) < 3.0 * sigma_deg
+    assert heading.rate_source == RATE_SUN
+
+
+def test_a_gyro_takes_over_and_gives_back():
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
+    assert flight.fly(100.0).rate_source == RATE_MOMENTUM
+    for gyro, source in ((True, RATE_GYRO), (False, RATE_MOMENTUM)):
+        heading = flight.fly(60.0, gyro=gyro)
+        assert heading.rate_source == source
+        assert flight.error_deg(heading) < 0.2
+
+
+def test_another_intensity_is_learnt():
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
+    flight.fly(60.0)
+
+    def aged(voltages):
+        voltages *= 0.7
+
+    heading = flight.fly(200.0, change=aged)
+    assert heading.validity == VALIDITY_VALID
+    assert flight.error_deg(heading) < 0.3
+
+
+def test_a_silence_is_not_bridged():
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
+    flight.fly(60.0)
+    aiding = UNAIDED._replace(sky=flight.sky)
+    flight.state, heading = sun_filter.step(flight.p, flight.state, flight.memory, 60.0, flight.voltages(), aiding)
+    assert heading.mode == sun_filter.MODE_SEARCHING
+    assert flight.error_deg(flight.fly(30.0)) < 1.0
+
+
+@pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
+def test_errors_are_as_large_as_the_filter_says(gyro):
+    """NEES and NIS are chi-square where the model is the truth (Bar-Shalom, Li & Kirubarajan, chapter 5)."""
+    squared, innovations, freedom = [], 0.0, 0
+    cases = 40
+    for seed, sun_b in enumerate(directions(cases)):
+        flight = SunFilterFlight(sun_b, TURNING, seed, white=0.02, **SIX, **NO_EARTH, **EXACT)
+        heading = flight.fly(60.0, gyro=gyro)
+        for _ in range(50):
+            heading = flight.step(gyro=gyro)
+            innovations += heading.nis
+            freedom += heading.nis_dof
+        error = np.subtract(heading.sun_b, flight.sun_b)
+        across = np.linalg.svd(np.array([flight.sun_b]))[2][1:]
+        covariance = across @ np.reshape(heading.covariance, (3, 3)) @ across.T
+        squared.append(across @ error @ np.linalg.solve(covariance, across @ error))
+    # 99.9 % of the mean of 40 chi-square numbers of two degrees of freedom
+    assert 1.1 < np.mean(squared) < 3.2
+    assert 0.9 < innovations / freedom < 1.1
