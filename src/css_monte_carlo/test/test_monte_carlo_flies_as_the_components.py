@@ -44,6 +44,7 @@ VARIANTS = {
         "dynamics.substeps=2",
         "dynamics.disturbances.gravity_gradient=true",
         "dynamics.disturbances.dipole=0.5,-0.2,1.0",
+        "dynamics.dispersion.dipole=0.3",
         "gyro.bias_walk_deg_s=0.001",
     ),
     "rods that take the wheels' momentum": (
