@@ -54,6 +54,15 @@ VARIANTS = {
         "mrp_control.dumping.enabled=true",
         "dynamics.initial.wheel_speed_rpm=2000",
     ),
+    "a spin about the Sun line, and a momentum that the wheels keep": (
+        RODS,
+        "rods.fitted=true",
+        "mrp_control.dumping.enabled=true",
+        "mrp_control.dumping.momentum=0.1,0.0,-0.2",
+        "mrp_control.reference.spin_deg_s=1.5",
+        "mrp_control.reference.acceleration_deg_s2=0.2",
+        "mrp_control.reference.known_torque=0.001,0.0,0.0",
+    ),
     "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }
