@@ -120,6 +120,16 @@ def test_torque_rods_alone_are_the_same(name, variant):
     assert np.any(log.having("rod_command").dipole)
 
 
+def test_rods_rest_the_same_while_the_magnetometer_is_off():
+    events = "events: {off: {time: 20.0, node: magnetometer, action: deactivate}, on: {time: 30.0, node: magnetometer, "
+    text = f"extends: cubesat_3u_safe, mission: {{duration: 60.0}}, {events}action: activate}}}}"
+    mission = mission_from_text(f"/**: {{ros__parameters: {{{text}}}}}", "scripted")
+    assert same_steps(mission) == 240
+    dipoles = np.any(fly_directly(mission).having("rod_command").dipole, axis=1)
+    # the last measurement counts until the next is due; two make a pair again
+    assert np.any(dipoles[60:80]) and not np.any(dipoles[80:124]) and np.any(dipoles[124:])
+
+
 # sunrise after two minutes, and gains that then find the Sun in one
 SUNRISE = (
     "orbit.true_anomaly_deg=43.0",
