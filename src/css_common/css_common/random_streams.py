@@ -34,6 +34,7 @@ class Stream(IntEnum):
     INERTIA = 13
     WHEEL_LIMIT = 14
     ATTITUDE_GUESS = 15
+    DIPOLE = 16
     SLIT_JITTER = 21
     SLIT_FAULT = 22
     SPIN_PHASE = 23

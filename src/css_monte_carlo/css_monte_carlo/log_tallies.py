@@ -104,8 +104,15 @@ def _rod_dipoles(log: FlightLog) -> list[float]:
 
 def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b, rod_dipole: float) -> Truth:
     omega_bn_b = log.having("truth").omega_bn_b[step]
-    vectors = (sigma_bn, omega_bn_b, log.sun_b[step], log.array_normal_b, momentum_b, gyro_bias_b)
-    return Truth(*map(_vec3, vectors), rod_dipole)
+    return Truth(
+        _vec3(sigma_bn),
+        _vec3(omega_bn_b),
+        _vec3(log.sun_b[step]),
+        _vec3(log.array_normal_b),
+        _vec3(momentum_b),
+        _vec3(gyro_bias_b),
+        rod_dipole,
+    )
 
 
 def _heading(estimates, row: int) -> SunHeading:

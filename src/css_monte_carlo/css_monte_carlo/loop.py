@@ -13,14 +13,14 @@ import numpy as np
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel, outer_kernel
 from css_common.random_streams import RandomKey
-from css_common.vectors import Vec3, mat3, multiply
+from css_common.vectors import Vec3, mat3, multiply, row
 from css_environment.albedo_vector import PATCHES, point_source
 from css_estimation.sun.sun_heading import Aiding, Sky
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
 from css_sim import gyro, magnetometer
-from css_sim.disturbances import Disturbances
+from css_sim.disturbances import Disturbances, with_dipole
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
 from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
 from css_sim.spacecraft import Spacecraft, advance
@@ -56,6 +56,7 @@ class Cases(NamedTuple):
     numbers: np.ndarray  # (C,) uint32
     inertia: np.ndarray  # (C, 3, 3) [kg m^2]
     inertia_inverse: np.ndarray  # (C, 3, 3)
+    dipole: np.ndarray  # (C, 3) [A m^2] residual
     wheels: np.ndarray  # (C, N) of rigid_body.WHEEL
     wheel_momentum: np.ndarray  # (C, N) [N m s] advanced in place
     cells: np.ndarray  # (C, n) of cell_errors.CELL
@@ -102,7 +103,9 @@ def case_key(cases: Cases, c: int) -> RandomKey:
 @outer_kernel
 def _case_spacecraft(v: Vehicle, cases: Cases, c: int) -> Spacecraft:
     body = RigidBody(mat3(cases.inertia[c]), mat3(cases.inertia_inverse[c]), cases.wheels[c], v.substeps)
-    return Spacecraft(body, v.disturbances, v.rod_axes_b, v.rod_max_dipole, v.disturbed)
+    return Spacecraft(
+        body, with_dipole(v.disturbances, row(cases.dipole, c)), v.rod_axes_b, v.rod_max_dipole, v.disturbed
+    )
 
 
 @outer_kernel

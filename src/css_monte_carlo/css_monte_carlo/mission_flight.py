@@ -143,6 +143,7 @@ class MissionFlight:
             numbers=np.array(numbers, dtype=np.uint32),
             inertia=np.array([body.inertia for body in bodies]),
             inertia_inverse=np.array([body.inertia_inverse for body in bodies]),
+            dipole=np.array([initial_conditions.dispersed_dipole(plant, key) for key in keys]),
             wheels=np.stack([body.wheels for body in bodies]),
             wheel_momentum=np.stack(
                 [
@@ -232,7 +233,7 @@ class MissionFlight:
 
     def _feels_field(self) -> bool:
         plant = self._plant.values
-        return self._magnetometer is not None or plant.rods.fitted or bool(np.any(plant.disturbances.dipole))
+        return self._magnetometer is not None or plant.rods.fitted or initial_conditions.has_dipole(plant)
 
     def _faults(self, array: Values, numbers: np.ndarray) -> np.ndarray:
         return np.stack([cell_faults.case_faults(array, self._key(int(number))) for number in numbers])

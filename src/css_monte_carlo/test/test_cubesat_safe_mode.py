@@ -112,7 +112,7 @@ def test_a_mission_that_does_not_ask_judges_no_study():
 
 def test_a_criterion_that_nothing_measures_is_refused_before_the_study():
     text = "/**: {ros__parameters: {extends: cubesat_3u_safe, criteria: {detumbled: {max: 1.0}}}}"
-    with pytest.raises(MissionError, match="criteria.detumbled: unknown; did you mean detumbled_s"):
+    with pytest.raises(MissionError, match=r"criteria\.detumbled: unknown; did you mean detumbled_s"):
         refuse_unknown_criteria(mission_from_text(text, "made up"))
 
 

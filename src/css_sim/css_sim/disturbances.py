@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.kernel import kernel
+from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Table, Values, flag, real, reals
 from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, norm, scale, unit
 from css_environment.atmosphere import ATMOSPHERE_400_KM, ExponentialAtmosphere, air_velocity, density
@@ -97,6 +97,22 @@ def conflicts(values: Values) -> Iterator[str]:
     for name in ("aerodynamic", "solar_pressure"):
         if getattr(values.disturbances, name) and count == 0:
             yield f"disturbances.{name}: true given without panels, expected panels.areas, normals and centres"
+
+
+@outer_kernel
+def with_dipole(p: Disturbances, dipole_b: Vec3) -> Disturbances:
+    """The same disturbances with another residual dipole [A m^2]."""
+    return Disturbances(
+        p.gravity_gradient,
+        p.aerodynamic,
+        p.solar_pressure,
+        p.atmosphere,
+        dipole_b,
+        p.drag_coefficient,
+        p.specular,
+        p.diffuse,
+        p.panels,
+    )
 
 
 @kernel

@@ -14,6 +14,7 @@ from css_common.sections import wheel_axes
 from css_common.vectors import Vec3
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.orbit_checks import field_findings, orbit_findings
+from css_sim.initial_conditions import has_dipole
 
 FASTEST = 200.0
 """Body rate [rad/s] beyond which a flight ends: nothing that carries sun sensors holds together there."""
@@ -61,7 +62,7 @@ def plant_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
 
 def _field_matters(values: Values, graph: Mapping[str, Node]) -> bool:
     measured = any(output.topic == "mag/field" for other in graph.values() for output in other.outputs)
-    return measured or values.rods.fitted or bool(np.any(values.disturbances.dipole))
+    return measured or values.rods.fitted or has_dipole(values)
 
 
 def _first_rates(values: Values) -> tuple[str, np.ndarray]:
@@ -105,8 +106,9 @@ def _swing_findings(values: Values) -> Iterator[Finding]:
     )
     field = _FIELD_AT_GROUND * (EARTH_RADIUS / perigee) ** 3
     gravity = values.disturbances.gravity_gradient
+    dipole = np.abs(values.disturbances.dipole) + values.dispersion.dipole
     squares = {
-        "disturbances.dipole": float(np.linalg.norm(values.disturbances.dipole)) * field / smallest,
+        "disturbances.dipole": float(np.linalg.norm(dipole)) * field / smallest,
         "disturbances.gravity_gradient": 3.0 * EARTH_MU / perigee**3 * (largest - smallest) / smallest * gravity,
     }
     period, duration = values.mission.period, values.mission.duration

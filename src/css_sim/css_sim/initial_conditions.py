@@ -22,6 +22,14 @@ from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momen
 _DISPERSION = (
     reals("initial.wheel_speed_rpm", (), "rpm", "wheel speeds relative to the body; empty: at rest"),
     real("dispersion.inertia", 0.0, "-", "1 sigma of each principal moment, relative", low=0.0, high=0.2),
+    real(
+        "dispersion.dipole",
+        0.0,
+        "A m^2",
+        "1 sigma of the residual dipole about its mean, per axis",
+        low=0.0,
+        high=100.0,
+    ),
     real("dispersion.wheel_torque", 0.0, "-", "1 sigma of each wheel's torque limit, relative", low=0.0, high=0.5),
 )
 
@@ -129,6 +137,21 @@ def initial_wheel_momentum(body: RigidBody, omega_bn_b: Vec3, wheel_speed_rpm) -
         ],
         dtype=np.float64,
     )
+
+
+def dispersed_dipole(values: Values, key: RandomKey) -> Vec3:
+    """Residual dipole of one case in b [A m^2]: `disturbances.dipole`, dispersed."""
+    x, y, z = (float(m) for m in values.disturbances.dipole)
+    sigma = float(values.dispersion.dipole)
+    if sigma == 0.0:
+        return (x, y, z)
+    n = normal4(key, Stream.DIPOLE, 0, 0)
+    return (x + sigma * n[0], y + sigma * n[1], z + sigma * n[2])
+
+
+def has_dipole(values: Values) -> bool:
+    """Whether the spacecraft of some case has a residual dipole."""
+    return bool(np.any(values.disturbances.dipole)) or values.dispersion.dipole > 0.0
 
 
 def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBody:

@@ -13,7 +13,7 @@ from css_common.vectors import Vec3, add, cross, multiply
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances
 from css_sim.disturbances import Disturbances, disturbance_torque
-from css_sim.initial_conditions import dispersed_body
+from css_sim.initial_conditions import dispersed_body, dispersed_dipole, has_dipole
 from css_sim.rigid_body import RigidBody, RotationState, propagate
 
 
@@ -28,8 +28,8 @@ class Spacecraft(NamedTuple):
 
 
 def spacecraft(values: Values, key: RandomKey, substeps: int = 1) -> Spacecraft:
-    """The spacecraft of one case, with its drawn mass properties (sections spacecraft, wheels and rods)."""
-    environment = disturbances.parameters(values)
+    """The spacecraft of one case, with its drawn mass properties and dipole (sections spacecraft, wheels and rods)."""
+    environment = disturbances.parameters(values)._replace(dipole_b=dispersed_dipole(values, key))
     options = values.disturbances
     axes = values.rods.axes if values.rods.fitted else np.zeros((0, 3))
     return Spacecraft(
@@ -37,10 +37,7 @@ def spacecraft(values: Values, key: RandomKey, substeps: int = 1) -> Spacecraft:
         disturbances=environment,
         rod_axes_b=np.ascontiguousarray(axes, dtype=np.float64),
         rod_max_dipole=values.rods.max_dipole,
-        disturbed=options.gravity_gradient
-        or options.aerodynamic
-        or options.solar_pressure
-        or bool(np.any(options.dipole)),
+        disturbed=options.gravity_gradient or options.aerodynamic or options.solar_pressure or has_dipole(values),
     )
 
 

@@ -11,7 +11,7 @@ from scipy import stats
 from css_common.attitude import mrp_to_dcm
 from css_common.random_streams import random_key
 from css_common.sections import MISSION, SPACECRAFT, WHEELS
-from css_sim import initial_conditions
+from css_sim import disturbances, initial_conditions
 from css_sim.rigid_body import wheel_speed
 
 SIGNIFICANCE = 1e-4
@@ -19,7 +19,9 @@ CASES = 20_000
 
 
 def build(**changes):
-    return okeefe_values(MISSION + SPACECRAFT + WHEELS + initial_conditions.PARAMETERS, **changes)
+    return okeefe_values(
+        MISSION + SPACECRAFT + WHEELS + initial_conditions.PARAMETERS + disturbances.PARAMETERS, **changes
+    )
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +46,16 @@ def test_every_axis_points_everywhere_alike(attitudes):
     assert stats.kstest(azimuths, *turn).pvalue > SIGNIFICANCE
     clocks = np.arctan2(attitudes[:, 0, 2], attitudes[:, 1, 2])
     assert stats.kstest(clocks, *turn).pvalue > SIGNIFICANCE
+
+
+def test_a_dipole_is_spread_about_its_mean():
+    values = build(disturbances__dipole=[0.01, 0.0, -0.02], dispersion__dipole=0.005)
+    drawn = np.array([initial_conditions.dispersed_dipole(values, random_key(3, c)) for c in range(2000)])
+    for i, mean in enumerate((0.01, 0.0, -0.02)):
+        assert stats.kstest(drawn[:, i], "norm", (mean, 0.005)).pvalue > SIGNIFICANCE
+    assert np.abs(np.corrcoef(drawn.T) - np.eye(3)).max() < 0.1
+    given = build(disturbances__dipole=[0.01, 0.0, -0.02])
+    assert initial_conditions.dispersed_dipole(given, random_key(3, 1)) == (0.01, 0.0, -0.02)
 
 
 def test_a_tip_off_has_its_rate_in_every_direction():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The shape of a control law's module; node and Monte Carlo need nothing else of it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from css_common.schema import Table, Values
@@ -21,6 +21,10 @@ class ControlAlgorithm(Protocol):
     @property
     def parameters(self) -> Callable[[Values], Any]:
         """The algorithm's own parameters from checked values."""
+
+    @property
+    def conflicts(self) -> Callable[[Values], Iterable[str]]:
+        """What is wrong between parameters, one message each."""
 
     @property
     def initial_state(self) -> Callable[[Any], Any]:

@@ -3,7 +3,6 @@
 
 from typing import NamedTuple
 
-from css_common.kernel import kernel
 from css_common.vectors import Vec3
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
@@ -28,19 +27,3 @@ class ControlOutput(NamedTuple):
 def at_rest(mode: int, reason: int) -> ControlOutput:
     """Output of a control that does nothing: no torque, nothing known."""
     return ControlOutput(_ZERO, _ZERO, _ZERO, -1.0, 0.0, mode, reason, False, False, 0, 0)
-
-
-# Beyond these an input is a fault, not a measurement.
-LARGEST_DIRECTION = 2.0
-LARGEST_RATE = 100.0  # [rad/s]
-LARGEST_FIELD = 1.0  # [T]
-
-
-@kernel
-def within(values, limit: float) -> bool:
-    """Whether all values are numbers of at most a size."""
-    # a NaN compares false
-    for value in values:  # noqa: SIM110  (a generator expression does not compile)
-        if not abs(value) <= limit:
-            return False
-    return True

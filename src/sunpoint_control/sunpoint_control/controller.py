@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A control law as a component of the graph; a node file names the algorithm and what it listens to."""
 
+from collections.abc import Iterable
 from typing import ClassVar
 
 import numpy as np
@@ -62,6 +63,10 @@ class Controller(Component):
         if values.rods.fitted:
             outputs.append(Output("rods", "rods/dipole_command", RodDipoleCommand, ends_cycle=True))
         return tuple(outputs)
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        return cls.algorithm.conflicts(values)
 
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)

@@ -25,8 +25,8 @@ from css_common.declared import builder, computed, given, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, real
 from css_common.vectors import Mat3, Vec3, add, cross, mat3, multiply, norm, scale, subtract, unit
-from sunpoint_control.control_output import LARGEST_FIELD, LARGEST_RATE, within
 from sunpoint_control.held_field import HeldField
+from sunpoint_control.plausible import LARGEST_FIELD, LARGEST_RATE, within
 from sunpoint_control.torque_rods import NO_FIELD
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)

@@ -25,6 +25,13 @@ def magnetic_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding
     measured = any(output.topic == "mag/field" for other in graph.values() for output in other.outputs)
     if simulated and not measured:
         yield Finding("no node of graph.nodes publishes mag/field: the rods will rest")
+    sun = f"{values.graph.estimator}/sun_estimate"
+    if values.magnetometer.divider > 1 and not any(o.topic == sun for other in graph.values() for o in other.outputs):
+        yield Finding(
+            f"magnetometer.divider: {values.magnetometer.divider} given, but nothing comes in the cycles between two "
+            f"measurements, as no node of graph.nodes publishes {sun}: expected 1",
+            refused=simulated,
+        )
     p, interval = parameters(values), values.magnetometer.divider * values.mission.period
     if interval > p.motion.longest_gap:
         yield Finding(

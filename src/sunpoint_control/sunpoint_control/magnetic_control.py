@@ -22,11 +22,12 @@ from css_common.kernel import kernel
 from css_common.schema import Values, choice, flag
 from css_common.vectors import Vec3, angle_between, cross, norm
 from sunpoint_control import field_motion, magnetic_spin, modes
-from sunpoint_control.control_output import LARGEST_DIRECTION, LARGEST_RATE, ControlOutput, within
+from sunpoint_control.control_output import ControlOutput
 from sunpoint_control.field_motion import FieldMotion, FieldMotionParameters, field_now, follow_field, usable
 from sunpoint_control.held_field import HeldField
 from sunpoint_control.magnetic_spin import SpinParameters, damping_torque, spin_torque
 from sunpoint_control.modes import MODE_DETUMBLE, MODE_ECLIPSE, MODE_SAFE, ModeParameters, ModeState, next_mode
+from sunpoint_control.plausible import LARGEST_DIRECTION, LARGEST_RATE, within
 from sunpoint_control.torque_rods import TorqueRods, limit_dipoles, rod_dipoles, rod_torque
 
 # The numbers of css_msgs/SunEstimate.

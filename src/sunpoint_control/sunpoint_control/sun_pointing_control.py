@@ -14,7 +14,7 @@ from css_common.kernel import kernel
 from css_common.schema import Values, choice
 from css_common.vectors import Vec3, norm, scale
 from sunpoint_control import modes
-from sunpoint_control.control_output import LARGEST_DIRECTION, LARGEST_FIELD, LARGEST_RATE, ControlOutput, within
+from sunpoint_control.control_output import ControlOutput
 from sunpoint_control.held_field import HeldField
 from sunpoint_control.modes import (
     MODE_DETUMBLE,
@@ -35,6 +35,7 @@ from sunpoint_control.mrp_sun_pointing import (
     spin_reference,
     tracking_torque,
 )
+from sunpoint_control.plausible import LARGEST_DIRECTION, LARGEST_FIELD, LARGEST_RATE, within
 from sunpoint_control.wheel_allocation import WHEELS_OUT, AllocationParameters, allocate, limit_torques, wheel_momentum
 
 # The numbers of css_msgs/SunEstimate.

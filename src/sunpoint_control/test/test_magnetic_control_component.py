@@ -141,5 +141,27 @@ def test_a_mission_without_magnetometer_is_told_that_its_rods_will_rest():
     assert any("no node of graph.nodes publishes mag/field" in line for line in warnings)
 
 
+ALONE = """
+/**:
+  ros__parameters:
+    mission: {duration: 30.0, period: 0.25}
+    orbit: {source: elements, altitude: 500.0e+3, inclination_deg: 97.4}
+    spacecraft: {inertia: [0.039, 0.0, 0.0, 0.0, 0.034, 0.0, 0.0, 0.0, 0.010], array_normal: [1.0, 0.0, 0.0]}
+    wheels: {fitted: false}
+    rods: {fitted: true, max_dipole: 0.2}
+    magnetometer: {divider: DIVIDER}
+    graph: {nodes: [css_sim/dynamics, css_sim/magnetometer, sunpoint_control/magnetic_control]}
+magnetic_control:
+  ros__parameters: {law: detumble}
+"""
+
+
+def test_without_an_estimator_the_field_must_pace_the_cycles():
+    """Rods and magnetometer alone are enough for detumbling."""
+    assert preflight(mission_from_text(ALONE.replace("DIVIDER", "1"), "made up")) == []
+    with pytest.raises(MissionError, match=r"magnetometer\.divider: 4 given, but nothing comes in the cycles"):
+        preflight(mission_from_text(ALONE.replace("DIVIDER", "4"), "made up"))
+
+
 def test_the_mission_as_it_stands_is_not_doubtful():
     assert preflight(load_mission(MISSION)) == []

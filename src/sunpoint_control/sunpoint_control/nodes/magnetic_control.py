@@ -28,10 +28,6 @@ class MagneticControl(Controller):
         return ("spacecraft.inertia",)
 
     @classmethod
-    def conflicts(cls, values: Values) -> Iterable[str]:
-        return magnetic_control.conflicts(values)
-
-    @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return magnetic_findings(node, graph)
 

@@ -25,10 +25,6 @@ class MrpControl(Controller):
         return ("spacecraft.inertia", "wheels.axes") if values.wheels.fitted else ("spacecraft.inertia",)
 
     @classmethod
-    def conflicts(cls, values: Values) -> Iterable[str]:
-        return sun_pointing_control.conflicts(values)
-
-    @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return control_findings(node, graph)
 
