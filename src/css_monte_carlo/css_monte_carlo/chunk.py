@@ -85,9 +85,8 @@ def fly_cases(
     fly_block(first.vehicle, cases, states.rows, states.like, nothing, flight.marks[:0], 0, tallies, trace)
     for vehicle, tables, begin, end in _blocks(flight, cases):
         around, marks = flight.surroundings.block(begin, end - begin), flight.marks[begin:end]
-        block_trace = trace[:, begin:end] if traced else trace
         start = time.thread_time()
-        fly_block(vehicle, tables, states.rows, states.like, around, marks, begin, tallies, block_trace)
+        fly_block(vehicle, tables, states.rows, states.like, around, marks, begin, tallies, trace)
         cpu_s += time.thread_time() - start
         _check_motion(flight, numbers, cases.rates, begin)
     return Flown(tallies, trace, cpu_s)

@@ -93,7 +93,7 @@ def fly_block(
         marks: (K,) of `case_tallies.step_marks` for the steps of the block.
         first_step: number of the first step of the block.
         tallies: of `case_tallies` or of `attitude_tallies`: which estimate is measured.
-        trace: (C, K, columns) or (0, 0, 0): every step's values for comparisons.
+        trace: (C, steps, columns) or (0, 0, 0): every step's values for comparisons.
     """
     # nodes divide the time between stamps, the plant multiplies its period: the last bit may differ
     since_s = v.period_ns / 1e9
@@ -143,8 +143,8 @@ def fly_block(
             truth = Truth(rotation.sigma_bn, rotation.omega_bn_b, sun_b, v.array_normal_b, momentum_b, read.gyro_bias_b)
             tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
             if trace.shape[0] > 0:
-                _note(trace[c, k], rotation, torque, speeds)
-                note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
+                _note(trace[c, step], rotation, torque, speeds)
+                note_estimate(tallies, heading, attitude, trace[c, step, TRUTH_COLUMNS:])
             rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, applied)
         for i in range(3):
             cases.rates[c, i] = rotation.omega_bn_b[i]
