@@ -45,6 +45,7 @@ COPIED = (
     "conftest.py", "pyproject.toml", "README.md", "LICENSE", "sunpoint",
 )  # fmt: skip
 TEST_LIMIT = 100.0  # [s] of processor time for one test, kernels that it has compiled included
+_PYTEST = (sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "one_test")
 KILLED, SURVIVED, OPEN, EQUAL = "killed", "survived", "open", "equivalent"
 
 
@@ -147,7 +148,7 @@ class Trial:
         self._write(mutant.file, mutant.source)
         names = [str(file.relative_to(self._copy)) for file in files]
         collected = subprocess.run(
-            [sys.executable, "-m", "pytest", "--collect-only", "-q", "-p", "no:cacheprovider", "-p", "one_test", *names],
+            [*_PYTEST, "--collect-only", *names],
             cwd=self._copy,
             env=self._environment(self._copy / "progress.json"),
             capture_output=True,
@@ -155,7 +156,9 @@ class Trial:
         )
         if collected.returncode not in (0, 5):
             said = (collected.stdout + collected.stderr).strip()
-            raise SystemExit(f"mutants: the tests do not start without a mutant either (after ./sunpoint test?):\n{said}")
+            raise SystemExit(
+                f"mutants: without a mutant the tests do not start either (after ./sunpoint test?):\n{said}"
+            )
         self._write(mutant.file, mutant.mutation.applied(mutant.source))
 
     def _write(self, file: Path, source: bytes) -> None:
@@ -172,7 +175,7 @@ class Trial:
         progress.unlink(missing_ok=True)
         broken = {*left_out, *(test for test, sound in self._sound.items() if not sound)}
         names = [str(file.relative_to(self._copy)) if isinstance(file, Path) else file for file in files]
-        command = [sys.executable, "-m", "pytest", "-x", "-q", "--tb=no", "-p", "no:cacheprovider", "-p", "one_test"]
+        command = [*_PYTEST, "-x", "--tb=no"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         process = subprocess.Popen(
             [*command, *(f"--deselect={test}" for test in sorted(broken)), *names],

@@ -80,6 +80,11 @@ def test_what_cannot_be_replayed_is_refused_in_one_line(flight, tmp_path, reques
     assert "\n" not in str(caught.value)
 
 
+def test_a_gyro_is_switched_for_estimators_that_use_one(flight, tmp_path):
+    with pytest.raises(MissionError, match=r"^estimator triad: gyro given, but it uses none"):
+        _replayed(flight, tmp_path / "replay", "triad:gyro=off")
+
+
 def test_sqlite_recording_with_other_topic_names(flight, tmp_path):
     store = get_typestore(Stores.ROS2_JAZZY)
     definition = "std_msgs/Header header\nuint32 saturated\nfloat64[] voltages\n"

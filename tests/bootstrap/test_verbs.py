@@ -74,7 +74,7 @@ def started(monkeypatch):
 def test_linters_run_with_all_tests_and_on_request(started):
     assert main(["test"]) == 0
     assert main(["lint"]) == 0
-    assert started == ["linters", ["pytest", "-q", "-n", "2"], "linters"]
+    assert started == ["linters", ["pytest", *cli.ALL_TESTS], "linters"]
 
 
 def test_named_tests_run_alone(started):

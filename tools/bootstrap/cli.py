@@ -15,7 +15,8 @@ from bootstrap.verbs import JOINING, JOINING_OPTIONS, OWN_USAGE, VERBS, help_tex
 from css_common.network import NetworkError, stay_on_this_machine
 
 # Two processes, because every test of the graph waits for its nodes more than it computes.
-ALL_TESTS = ["-q", "-n", "2"]
+# The tests of a file on one processor: what they share is made once. In their order: the long ones come first.
+ALL_TESTS = ["-q", "-n", "2", "--dist", "loadfile", "--no-loadscope-reorder"]
 
 
 def main(arguments: list[str]) -> int:

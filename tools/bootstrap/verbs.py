@@ -67,7 +67,7 @@ OWN_USAGE = {
     "test": """Usage: ./sunpoint test [PYTEST ARGUMENTS]
 
 Runs pytest with message type checks on; without arguments ruff and mypy too, and fails if any of them does.
-  ./sunpoint test                                  linters and all tests, on two processors (pytest -q -n 2)
+  ./sunpoint test                                  linters and all tests, on two processors (pytest -q -n 2 ...)
   ./sunpoint test tests/test_processes.py          these tests alone
   ./sunpoint test src/css_common/test -k attitude  some of those
 All options: ./sunpoint shell -c 'pytest --help'""",

@@ -36,15 +36,6 @@ def heading_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
     return steps, angle(estimates.sun_b[rows], log.sun_b[steps])
 
 
-def rate_errors(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Steps of the truth (K,) and norms (K,) [rad/s] of the error of the estimated body rate there."""
-    estimates = log.estimates[name]
-    rows, steps = log.truth_rows(estimates)
-    known = estimates.rate_source[rows] != SunEstimate.RATE_NONE
-    rows, steps = rows[known], steps[known]
-    return steps, np.linalg.norm(estimates.omega_bn_b[rows] - log.having("truth").omega_bn_b[steps], axis=1)
-
-
 def tangent_nees(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Steps of the truth (K,) and normalised error squared (K,) on the two axes across the estimated Sun.
 

@@ -2,9 +2,7 @@
 """What people read of the runs of a flight: a table, and the mission's pass criteria that they miss."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, TextIO
-
-from rich.console import Console
+from typing import NamedTuple
 
 from css_analysis.estimator_runs import Run
 from css_analysis.quantities import QUANTITIES, Quantity
@@ -41,11 +39,6 @@ def _columns_of(runs: Sequence[Run]) -> list[Quantity]:
     if any(run["attitude_error_mean_deg"] is not None for run in runs):
         return [quantity for quantity in asked_for if any(run[quantity.name] is not None for run in runs)]
     return [quantity for quantity in asked_for if not quantity.name.startswith("attitude")]
-
-
-def print_summary(runs: Iterable[Run], title: str = "", file: TextIO | None = None) -> None:
-    """Print the runs, in colours on a terminal."""
-    Console(file=file, highlight=False).print(summary_table(runs, title))
 
 
 class Verdict(NamedTuple):

@@ -5,7 +5,7 @@ Figures of merit of a flight, columns of a study, pass criteria, JSON objects, t
 README come from it.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -470,8 +470,3 @@ def _attitude_over_cases(quantity: Quantity) -> Summary:
 
 def _mean_over_cases(quantity: Quantity) -> Summary:
     return Summary(quantity.name, quantity.study_column, "mean", quantity.heading, quantity.unit, quantity.form)
-
-
-def readme_rows(table: Iterable[Quantity]) -> list[str]:
-    """Lines of the README's table."""
-    return [f"| {' '.join(filter(None, (f'`{q.name}`', q.unit and f'[{q.unit}]')))} | {q.description} |" for q in table]

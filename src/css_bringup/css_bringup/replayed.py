@@ -12,7 +12,9 @@ from css_bringup.retracing import Given, Retrace
 from css_common.component import Input, Output
 from css_common.matching import Matcher
 from css_common.mission import Event, Mission, Node, find_component
+from css_common.mission_file import MissionError
 from css_common.schema import shaped_values
+from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_recording.bag_metadata import absolute
 
@@ -170,10 +172,12 @@ def _node(mission: Mission, name: str) -> Node | None:
 
 def _node_with(mission: Mission, base: Node | None, request: EstimatorRequest) -> Node:
     """The node that is asked for: that of the mission, or one more, with what is to be changed."""
+    component = find_component(ESTIMATORS, request.kind, "replay") if base is None else base.component
+    if "use_gyro" in request.changes and not uses_gyro(component):
+        raise MissionError(f"estimator {request.kind}: gyro given, but it uses none; expected no gyro=on or gyro=off")
     if base is not None:
         changed = mission.with_node((base.package, base.executable, base.name), request.changes)
         return changed.node(base.name) if request.changes else base
-    component = find_component(ESTIMATORS, request.kind, "replay")
     if not request.changes:
         return mission.node_of(component, request.kind)
     return mission.with_node((ESTIMATORS, request.kind, request.kind), request.changes).node(request.kind)

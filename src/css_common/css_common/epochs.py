@@ -28,8 +28,3 @@ def parse_utc(text: str) -> int:
 def format_utc(stamp_ns: int) -> str:
     """ISO 8601 text, to the microsecond, of nanoseconds since 1970."""
     return (_EPOCH + timedelta(microseconds=stamp_ns // 1000)).isoformat().replace("+00:00", "Z")
-
-
-def stamp_of_step(epoch_ns: int, step: int, period_ns: int) -> int:
-    """Stamp of step k; integer arithmetic, so that stamps of all nodes agree to the nanosecond."""
-    return epoch_ns + step * period_ns

@@ -1,6 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The decorators that compile Sunpoint's algorithms, and the place of the compile cache.
 
+Most of the time that a first start takes is spent on what stands around the arithmetic of a kernel: a function that
+takes apart Python's objects, of which a loop of a study has hundreds, and as many copies as there are constants in
+calls. A kernel is therefore compiled once for calls from Python and once for calls from kernels, each when the first
+one comes, and constants count by their type.
+
 Numba checks only the file of the function it loads from its cache: a cached caller keeps an old copy of a
 function that lives in another file. The cache folder of a kernel is therefore named by a hash of every source file
 that it can be made from, and of the versions that compile it: edit one, and what is made from it is compiled anew.
@@ -8,13 +13,14 @@ that it can be made from, and of the versions that compile it: edit one, and wha
 
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any, ParamSpec, Protocol, TypeVar, cast
 
 import llvmlite
 import numba
+from numba.core.types import unliteral
 
 from css_common import places
 from css_common.kernel_sources import hash_of, kernel_modules, sources_of
@@ -23,8 +29,14 @@ P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
 
 _COMPILER = f"{sys.version_info[:2]} {numba.__version__} {llvmlite.__version__}"
-_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": False}
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "fastmath": False, "no_cfunc_wrapper": True}
 _UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
+_ONLY_FROM_KERNELS = {"no_cpython_wrapper": True}
+
+
+def _folder(of_sources: str) -> Path:
+    # a user who names a folder has one for all sources, as numba has it
+    return Path(os.environ.get("NUMBA_CACHE_DIR") or _kernels() / of_sources)
 
 
 @cache
@@ -36,7 +48,7 @@ def study_hash(module: str) -> str:
 @cache
 def cache_folder(module: str) -> Path:
     """Folder of a module's compiled kernels: inside the project when started by `./sunpoint`, else the user's cache."""
-    return _kernels() / hash_of(sources_of(module), _COMPILER)
+    return _folder(hash_of(sources_of(module), _COMPILER))
 
 
 @cache
@@ -47,8 +59,7 @@ def _kernels() -> Path:
 def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any]) -> Any:
     # Numba takes the folder that its configuration names while it makes the dispatcher, and reads the configuration
     # anew from its environment whenever a variable of it has changed.
-    if not os.environ.get("NUMBA_CACHE_DIR"):
-        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # made at run time
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # made at run time
     return numba.njit(**options)(function)
 
 
@@ -73,28 +84,55 @@ def kernel(function: Callable[P, R]) -> "Kernel[P, R]":
     Raises:
         TypeError: at the first call, when the function returns an array.
     """
-    dispatcher: Any = _compiled(function, cache_folder(function.__module__), _UNCOUNTED)
+    return _uncounted(function, cache_folder(function.__module__), _UNCOUNTED)
+
+
+def study_kernel(function: Callable[P, R]) -> "Kernel[P, R]":
+    """Compiles the loop of a study: as `kernel` does, and other threads go on meanwhile.
+
+    Which kernels it calls may follow from the types of its arguments: it is compiled anew with any of them.
+    """
+    return _uncounted(function, _folder(study_hash(function.__module__)), _UNCOUNTED | {"nogil": True})
+
+
+def outer_kernel(function: Callable[P, R]) -> "Kernel[P, R]":
+    """Compiles an outermost loop: it may make and return arrays, and other threads go on meanwhile."""
+    return _compiled(function, cache_folder(function.__module__), _OPTIONS | {"nogil": True})
+
+
+def _uncounted(function: Callable[P, R], folder: Path, options: dict[str, Any]) -> "Kernel[P, R]":
+    dispatcher: Any = _compiled(function, folder, options)
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         return dispatcher
+
+    @cache
+    def called() -> Any:
+        return _without_arrays(_compiled(function, folder / "called", options | _ONLY_FROM_KERNELS))
+
+    def call_template(args: Iterable[Any], kws: Mapping[str, Any]) -> Any:
+        types = tuple(map(unliteral, args))
+        return called().get_call_template(types, {name: unliteral(kws[name]) for name in kws})
+
+    # numba asks these two of a dispatcher when it compiles a call of it
+    dispatcher.get_call_template = call_template
+    dispatcher.get_overload = lambda types: called().get_overload(types)
+    return _without_arrays(dispatcher)
+
+
+def _without_arrays(dispatcher: Any) -> Any:
+    """The dispatcher, which from now on refuses to compile what returns an array."""
     compile_types = dispatcher.compile
 
     def compile_checked(signature: Any) -> Any:
         entry = compile_types(signature)
         for compiled in dispatcher.overloads.values():
             if _holds_array(compiled.signature.return_type):
-                raise TypeError(f"{function.__qualname__}: a kernel must not return an array; let it write into one")
+                name = dispatcher.py_func.__qualname__
+                raise TypeError(f"{name}: a kernel must not return an array; let it write into one")
         return entry
 
     dispatcher.compile = compile_checked
     return dispatcher
-
-
-def outer_kernel(function: Callable[P, R]) -> "Kernel[P, R]":
-    """Compiles an outermost loop of a study: it may make and return arrays, and other threads go on meanwhile.
-
-    Which kernels it calls may follow from the types of its arguments: it is compiled anew with any of them.
-    """
-    return _compiled(function, _kernels() / study_hash(function.__module__), _OPTIONS | {"nogil": True})
 
 
 def _holds_array(numba_type: Any) -> bool:

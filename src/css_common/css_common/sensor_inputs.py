@@ -3,8 +3,13 @@
 
 from sensor_msgs.msg import Imu, MagneticField
 
-from css_common.component import Input
+from css_common.component import Component, Input
 from css_common.schema import Values
+
+
+def uses_gyro(component: type[Component]) -> bool:
+    """Whether a component has the parameter `use_gyro`, so that it can fly with a gyro or without."""
+    return any(parameter.name == "use_gyro" for parameter in component.table())
 
 
 def gyro_input(values: Values) -> Input:

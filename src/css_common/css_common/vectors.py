@@ -85,12 +85,6 @@ def row(a, i: int) -> Vec3:
 
 
 @kernel
-def vec3(a) -> Vec3:
-    """First three elements of an array as a vector of floats."""
-    return (float(a[0]), float(a[1]), float(a[2]))
-
-
-@kernel
 def multiply(m: Mat3, a: Vec3) -> Vec3:
     """Product of a matrix and a column vector."""
     return (dot(m[0], a), dot(m[1], a), dot(m[2], a))

@@ -134,7 +134,7 @@ def test_edit_two_imports_away_counts(project):
 def test_a_loop_is_made_from_every_kernel_that_it_may_be_handed(project):
     # nothing that is imported by the loop: called by the type of an argument, as an estimator is
     (project.root / "css_sim" / "outer.py").write_text(
-        "from css_common.kernel import outer_kernel\n@outer_kernel\ndef outer(x):\n    return 20.0 * x\n"
+        "from css_common.kernel import study_kernel\n@study_kernel\ndef outer(x):\n    return 20.0 * x\n"
     )
     before = project.run()
     assert project.run() == before | {"hits": 1}

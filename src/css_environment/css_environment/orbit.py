@@ -62,11 +62,6 @@ def keplerian_orbit(
     )
 
 
-def orbit_period(orbit: KeplerianOrbit) -> float:
-    """Two-body period [s]."""
-    return 2.0 * math.pi * math.sqrt(orbit.semi_major_axis**3 / EARTH_MU)
-
-
 def orbit_states(orbit: Orbit, epoch_ns: int, elapsed_s) -> tuple[np.ndarray, np.ndarray]:
     """Position [m] and velocity [m/s] in n, each (T, 3), at (T,) seconds after the epoch (UTC, ns)."""
     elapsed_s = np.atleast_1d(np.asarray(elapsed_s, dtype=float))

@@ -15,10 +15,3 @@ def sun_positions(epoch_ns: int, elapsed_s) -> np.ndarray:
     """
     heliocentric, _ = erfa.epv00(*terrestrial_date(epoch_ns, np.atleast_1d(elapsed_s)))
     return -ASTRONOMICAL_UNIT * heliocentric["p"]
-
-
-def sun_directions(epoch_ns: int, elapsed_s, r_n) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors from spacecraft positions `r_n` (T, 3) [m] to the Sun, (T, 3), and distances [m], (T,)."""
-    line = sun_positions(epoch_ns, elapsed_s) - r_n
-    distance = np.linalg.norm(line, axis=1)
-    return line / distance[:, None], distance

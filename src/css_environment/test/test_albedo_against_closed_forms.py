@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from celestial import orbit_period
 from scipy.integrate import quad
 
 from css_environment.albedo import Screen, albedo_output, new_workspace, plane_screen, soft_screen, transmission
@@ -28,7 +29,7 @@ from css_environment.earth_light import (
     write_patch,
 )
 from css_environment.ephemeris import at, build_ephemeris
-from css_environment.orbit import keplerian_orbit, orbit_period
+from css_environment.orbit import keplerian_orbit
 from css_environment.reflectivity import zonal_reflectivity
 
 CELL = np.dtype([(name, float) for name in ("nx", "ny", "nz", "side")], align=True)

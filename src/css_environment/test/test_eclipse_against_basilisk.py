@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from celestial import orbit_period
 from hypothesis import given
 from hypothesis import strategies as st
 
 from css_environment.constants import ASTRONOMICAL_UNIT, EARTH_RADIUS, SOLAR_RADIUS
 from css_environment.eclipse import conical_illumination, cylindrical_illumination
 from css_environment.ephemeris import at, build_ephemeris
-from css_environment.orbit import keplerian_orbit, orbit_period
+from css_environment.orbit import keplerian_orbit
 
 PARITY = json.loads((Path(__file__).parent / "data" / "eclipse.json").read_text())
 AU = ASTRONOMICAL_UNIT

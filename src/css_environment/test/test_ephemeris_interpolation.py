@@ -8,6 +8,7 @@ import erfa
 import numpy as np
 import ppigrf
 import pytest
+from celestial import sun_directions
 
 from css_common.vectors import multiply
 from css_environment.constants import ASTRONOMICAL_UNIT
@@ -15,7 +16,6 @@ from css_environment.earth_rotation import dcm_en_at
 from css_environment.ephemeris import SEGMENT_S, at, build_ephemeris, segment_start
 from css_environment.magnetic_field import field_along_orbit
 from css_environment.orbit import TleOrbit, keplerian_orbit, orbit_states
-from css_environment.sun import sun_directions
 
 EPOCH_NS = 1_370_044_800 * 10**9
 ORBITS = {

@@ -116,48 +116,49 @@ outputs = st.one_of(
 )
 rates = st.one_of(st.floats(-0.2, 0.2), st.floats(allow_nan=True, allow_infinity=True))
 fields = st.one_of(st.floats(-6e-5, 6e-5), st.floats(allow_nan=True, allow_infinity=True))
-cycle = st.tuples(
-    st.lists(outputs, min_size=32, max_size=32),
-    st.builds(
-        UNAIDED._replace,
-        gyro_b=st.tuples(rates, rates, rates),
-        gyro_valid=st.booleans(),
-        field_b=st.tuples(fields, fields, fields),
-        field_valid=st.booleans(),
-        wheel_speeds=st.builds(np.array, st.lists(rates, min_size=4, max_size=4)),
-        wheels_valid=st.booleans(),
-        sky=st.builds(
-            UNKNOWN_SKY._replace,
-            known=st.booleans(),
-            illumination=st.sampled_from([0.0, 0.5, 1.0]),
-            light=st.sampled_from([UNKNOWN_SKY.light, earth_below()]),
-        ),
+aidings = st.builds(
+    UNAIDED._replace,
+    gyro_b=st.tuples(rates, rates, rates),
+    gyro_valid=st.booleans(),
+    field_b=st.tuples(fields, fields, fields),
+    field_valid=st.booleans(),
+    wheel_speeds=st.builds(np.array, st.lists(rates, min_size=4, max_size=4)),
+    wheels_valid=st.booleans(),
+    sky=st.builds(
+        UNKNOWN_SKY._replace,
+        known=st.booleans(),
+        illumination=st.sampled_from([0.0, 0.5, 1.0]),
+        light=st.sampled_from([UNKNOWN_SKY.light, earth_below()]),
     ),
-    st.one_of(st.sampled_from([0.1, 0.0, 1e-9, 1.0, 3600.0]), st.floats(allow_nan=True, allow_infinity=True)),
-    st.sampled_from([-1, 0, 1]),
 )
+times = st.one_of(st.sampled_from([0.1, 0.0, 1e-9, 1.0, 3600.0]), st.floats(allow_nan=True, allow_infinity=True))
+
+
+@cache
+def cycles_of(count):
+    """A few cycles with so many cells."""
+    voltages = st.lists(outputs, min_size=count, max_size=count)
+    return st.lists(st.tuples(voltages, aidings, times, st.sampled_from([-1, 0, 1])), min_size=1, max_size=12)
 
 
 @VARIANTS
 @settings(max_examples=25, deadline=None)
-@given(cycles=st.lists(cycle, min_size=1, max_size=12), data=st.data())
-def test_any_sequence(kind, options, cycles, data):
+@given(data=st.data())
+def test_any_sequence(kind, options, data):
     count = data.draw(st.sampled_from(sorted(layouts(kind))), "cells")
     drawn = {"eclipse__source": "both"}
     if any(parameter.name == "rate.use_field" for parameter in kind.parameters):
         drawn["rate__use_field"] = data.draw(st.booleans(), "use_field")
     p, state, memory = build(kind, count, **(drawn | options))
-    for voltages, aiding, dt, predicted in cycles:
-        state, heading = kind.algorithm.step(
-            p, state, memory, dt, np.array(voltages[:count]), predicting(predicted, aiding)
-        )
+    for voltages, aiding, dt, predicted in data.draw(cycles_of(count), "cycles"):
+        state, heading = kind.algorithm.step(p, state, memory, dt, np.array(voltages), predicting(predicted, aiding))
         assert_sane(heading)
 
 
 @pytest.mark.parametrize("kind", KINDS, ids=executable)
 @settings(max_examples=100, deadline=None)
-@given(cycles=st.lists(cycle, min_size=1, max_size=12), data=st.data())
-def test_any_sequence_with_parameters_at_the_ends_of_their_ranges(kind, cycles, data):
+@given(data=st.data())
+def test_any_sequence_with_parameters_at_the_ends_of_their_ranges(kind, data):
     count = data.draw(st.sampled_from(sorted(layouts(kind))), "cells")
     ends = {}
     for parameter in kind.parameters:
@@ -166,10 +167,8 @@ def test_any_sequence_with_parameters_at_the_ends_of_their_ranges(kind, cycles, 
             known = [end for end in (parameter.default, low, parameter.high) if end is not None]
             ends[parameter.name.replace(".", "__")] = st.sampled_from(known)
     p, state, memory = build(kind, count, **data.draw(st.fixed_dictionaries(ends), "parameters"))
-    for voltages, aiding, dt, predicted in cycles:
-        state, heading = kind.algorithm.step(
-            p, state, memory, dt, np.array(voltages[:count]), predicting(predicted, aiding)
-        )
+    for voltages, aiding, dt, predicted in data.draw(cycles_of(count), "cycles"):
+        state, heading = kind.algorithm.step(p, state, memory, dt, np.array(voltages), predicting(predicted, aiding))
         assert_sane(heading, largest_variance=100.0)
 
 

@@ -78,7 +78,7 @@ def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_
         errors.append(flight.error_deg(heading))
     assert heading.mode == sun_filter.MODE_NO_EARTH
     sigma_deg = math.degrees(math.sqrt(np.trace(np.reshape(heading.covariance, (3, 3))) / 2.0))
-    assert 1.0 < sigma_deg and errors[1] < 3.0 * sigma_deg
+    assert sigma_deg > 1.0 and errors[1] < 3.0 * sigma_deg
     assert errors[0] < min(1.2, 0.6 * errors[1])
 
 

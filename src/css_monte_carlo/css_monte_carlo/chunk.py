@@ -3,12 +3,11 @@
 
 import os
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import numba.typed
 import numpy as np
 import pyarrow as pa
 
@@ -16,10 +15,11 @@ from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.errors import StudyError
-from css_monte_carlo.loop import fly_block
+from css_monte_carlo.loop import Cases, Vehicle, fly_block
 from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
+from css_monte_carlo.state_table import StateTable
 from css_monte_carlo.stepped_flight import SteppedFlight
 from css_monte_carlo.surroundings import BLOCK_STEPS
 from css_sim.flight_checks import MotionError, check_rate
@@ -78,21 +78,25 @@ def fly_cases(
     period_s = flight.mission.period_ns * 1e-9
     tallies = flight.measure.new_tallies(len(numbers), flight.steps, period_s, sample_every, windows_of(flight.mission))
     trace = np.zeros((len(numbers), flight.steps, flight.trace_columns) if traced else (0, 0, 0))
-    states = numba.typed.List(initial)
+    states = StateTable(initial)
     cpu_s = 0.0
-    first = next(flight.stretches(cases))
+    first, nothing = next(flight.stretches(cases)), flight.surroundings.block(0, 1)
     # no steps: compiled, or loaded, before time is taken
-    fly_block(first.vehicle, cases, states, flight.surroundings.block(0, 1), flight.marks[:0], 0, tallies, trace)
+    fly_block(first.vehicle, cases, states.rows, states.like, nothing, flight.marks[:0], 0, tallies, trace)
+    for vehicle, tables, begin, end in _blocks(flight, cases):
+        around, marks = flight.surroundings.block(begin, end - begin), flight.marks[begin:end]
+        start = time.thread_time()
+        fly_block(vehicle, tables, states.rows, states.like, around, marks, begin, tallies, trace)
+        cpu_s += time.thread_time() - start
+        _check_motion(flight, numbers, cases.rates, begin)
+    return Flown(tallies, trace, cpu_s)
+
+
+def _blocks(flight: MissionFlight, cases: Cases) -> Iterator[tuple[Vehicle, Cases, int, int]]:
+    """Each block of steps, from the first to before the last, and what flies in it."""
     for stretch in flight.stretches(cases):
         for begin in range(stretch.first, stretch.end, BLOCK_STEPS):
-            rows = slice(begin, min(begin + BLOCK_STEPS, stretch.end))
-            around = flight.surroundings.block(begin, rows.stop - begin)
-            block_trace = trace[:, rows] if traced else trace
-            start = time.thread_time()
-            fly_block(stretch.vehicle, stretch.cases, states, around, flight.marks[rows], begin, tallies, block_trace)
-            cpu_s += time.thread_time() - start
-            _check_motion(flight, numbers, states, begin)
-    return Flown(tallies, trace, cpu_s)
+            yield stretch.vehicle, stretch.cases, begin, min(begin + BLOCK_STEPS, stretch.end)
 
 
 def fly_in_threads(
@@ -127,10 +131,10 @@ def _joined(parts: Sequence[Any]) -> Any:
     return parts[0]._replace(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in by_case})
 
 
-def _check_motion(flight: MissionFlight, numbers: np.ndarray, states: Iterable, step: int) -> None:
-    for number, state in zip(numbers, states, strict=True):
+def _check_motion(flight: MissionFlight, numbers: np.ndarray, rates: np.ndarray, step: int) -> None:
+    for number, rate in zip(numbers, rates, strict=True):
         try:
-            check_rate(state.rotation.omega_bn_b)
+            check_rate(rate)
         except MotionError as error:
             after = step * flight.mission.period_ns * 1e-9
             raise StudyError(f"case {number} of {flight.mission.name}, after {after:g} s: {error}") from error

@@ -17,6 +17,7 @@ from css_common.component import Outgoing, Plant
 from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
+from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_monte_carlo.mission_parts import is_attitude
 
@@ -29,7 +30,7 @@ def configured(
     An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then switched for it.
 
     Raises:
-        MissionError: there is no such estimator.
+        MissionError: there is no such estimator, or it uses no gyro and shall fly without.
     """
     if case is not None:
         mission = mission.with_overrides([f"mission.case={case}"])
@@ -37,8 +38,9 @@ def configured(
     name = flown if estimator is None else estimator
     if name != flown and not is_attitude_filter(mission, name):
         mission = _with_estimator(mission, name)
-    node = mission.node(name)
-    if gyro and all(parameter.name != "use_gyro" for parameter in node.component.table()):
+    if not uses_gyro(mission.node(name).component):
+        if not gyro:
+            raise MissionError(f"{mission.origin}: gyro off given, but {name} uses no gyro; expected gyro on for it")
         return mission
     return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
 

@@ -11,16 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.attitude import mrp_to_dcm
-from css_common.kernel import kernel, outer_kernel
+from css_common.kernel import kernel, study_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply, row
 from css_environment.albedo_vector import PATCHES, point_source
 from css_estimation.sun.sun_heading import Aiding, Sky
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
+from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
 from css_sim import gyro, magnetometer
-from css_sim.disturbances import Disturbances, with_dipole
+from css_sim.disturbances import with_dipole
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
 from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
 from css_sim.spacecraft import Spacecraft, advance
@@ -40,11 +41,7 @@ class Vehicle(NamedTuple):
     heading: Any  # parameters of the Sun estimator, or None
     attitude: Any  # parameters of the attitude filter, or None
     control: Any  # parameters of the control law, or None
-    disturbances: Disturbances
-    disturbed: bool
-    rod_axes_b: np.ndarray  # (M, 3)
-    rod_max_dipole: float  # [A m^2]
-    substeps: int
+    craft: Spacecraft  # nominal
     array_normal_b: Vec3
 
 
@@ -59,6 +56,12 @@ class Cases(NamedTuple):
     dipole: np.ndarray  # (C, 3) [A m^2] residual
     wheels: np.ndarray  # (C, N) of rigid_body.WHEEL
     wheel_momentum: np.ndarray  # (C, N) [N m s] advanced in place
+    torque: np.ndarray  # (C, N) [N m] room for what is commanded
+    applied: np.ndarray  # (C, N) [N m]
+    speeds: np.ndarray  # (C, N) [rad/s]
+    rod_dipole: np.ndarray  # (C, M) [A m^2]
+    voltages: np.ndarray  # (C, n) [V]
+    rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
     faults: np.ndarray  # (C, F) of cell_faults.FAULT
     reflectivity: np.ndarray  # (C, rows, columns); (0, 0, 0) when the Earth is common
@@ -80,128 +83,99 @@ class CaseState(NamedTuple):
     field_step: int  # when it was taken; -1: never
 
 
-class Actuators(NamedTuple):
-    """Arrays of the N wheels and M rods of one case."""
-
-    momentum: np.ndarray  # (N,) [N m s] advanced in place
-    torque: np.ndarray  # (N,) [N m] commanded
-    applied: np.ndarray  # (N,) [N m]
-    speeds: np.ndarray  # (N,) [rad/s]
-    dipole: np.ndarray  # (M,) [A m^2] commanded
-
-
 TRUTH_COLUMNS = 6
 """Columns of a trace that hold sigma_bn and omega_bn_b; the estimate, dipoles, wheel torques and speeds follow."""
 
 
-@kernel
-def case_key(cases: Cases, c: int) -> RandomKey:
-    """Key of the draws of a case."""
-    return RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
-
-
-@outer_kernel
-def _case_spacecraft(v: Vehicle, cases: Cases, c: int) -> Spacecraft:
-    body = RigidBody(mat3(cases.inertia[c]), mat3(cases.inertia_inverse[c]), cases.wheels[c], v.substeps)
-    return Spacecraft(
-        body, with_dipole(v.disturbances, row(cases.dipole, c)), v.rod_axes_b, v.rod_max_dipole, v.disturbed
-    )
-
-
-@outer_kernel
-def _case_sensors(v: Vehicle, cases: Cases, c: int) -> SensorsOfCase:
-    key = case_key(cases, c)
-    cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
-    gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
-    return SensorsOfCase(key, cells, gyro_errors, magnetometer.draw_bias(v.sensors.magnetometer, key))
-
-
-@outer_kernel
+@study_kernel
 def fly_block(
-    v: Vehicle, cases: Cases, states, around: Surroundings, marks, first_step: int, tallies: Any, trace
+    v: Vehicle, cases: Cases, states, like, around: Surroundings, marks, first_step: int, tallies: Any, trace
 ) -> None:
     """Flies all cases through one block of steps.
 
     Args:
-        states: list of the `CaseState` of each case, advanced.
+        states, like: rows of the `StateTable` of the cases, advanced, and one of its states.
         marks: (K,) of `case_tallies.step_marks` for the steps of the block.
         first_step: number of the first step of the block.
         tallies: of `case_tallies` or of `attitude_tallies`: which estimate is measured.
-        trace: (C, K, columns) or (0, 0, 0): every step's values for comparisons.
+        trace: (C, steps, columns) or (0, 0, 0): every step's values for comparisons.
     """
-    for c in range(cases.numbers.shape[0]):
-        states[c] = _fly_case(v, cases, c, states[c], around, marks, first_step, tallies, trace)
-
-
-@outer_kernel
-def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
-    wheels = cases.wheel_momentum.shape[1]
-    actuators = Actuators(
-        cases.wheel_momentum[c], np.zeros(wheels), np.zeros(wheels), np.zeros(wheels), np.zeros(v.rod_axes_b.shape[0])
-    )
-    craft, sensors, voltages = _case_spacecraft(v, cases, c), _case_sensors(v, cases, c), np.zeros(cases.cells.shape[1])
-    rotation, heading, attitude, control, field_b, field_step = _fly_steps(
-        v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace
-    )
-    return CaseState(rotation, heading, state.heading_memory, attitude, state.memory, control, field_b, field_step)
-
-
-@kernel
-def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace):
-    """The steps of a block: a kernel, so that no array is counted as a reference; returns the state but the memory."""
-    torque, dipole, speeds, momentum = actuators.torque, actuators.dipole, actuators.speeds, actuators.momentum
     # nodes divide the time between stamps, the plant multiplies its period: the last bit may differ
     since_s = v.period_ns / 1e9
     cycle_s = v.period_ns * 1e-9
-    rotation, field_b, field_step = state.rotation, state.field_b, state.field_step
-    heading_state, attitude_state, control_state = state.heading, state.attitude, state.control
-    for k in range(marks.shape[0]):
-        step = first_step + k
-        environment = state_at(around.states, k)
-        dcm_bn = mrp_to_dcm(rotation.sigma_bn)
-        sun_b = multiply(dcm_bn, environment.sun_n)
-        light = around.light[min(k, around.light.shape[0] - 1)]
-        if v.own_earth:
-            light = cases.light[c]
-            _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
-        read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
-        if read.field_valid:
-            field_b, field_step = read.field_b, step
-        wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
-        known, predicted, sun_n, solar_flux, illumination = sky_at(around.sky, k)
-        sky_light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
-        sky = Sky(known, predicted, sun_n, solar_flux, illumination, sky_light)
-        field_is_new = v.heading_hears_field and read.field_valid
-        aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
-        heading_state, heading = estimate_heading(
-            v.heading, heading_state, state.heading_memory, since_s, voltages, aiding
+    for c in range(cases.numbers.shape[0]):
+        state, voltages = state_of(states, c, like), cases.voltages[c]
+        momentum, torque, applied = cases.wheel_momentum[c], cases.torque[c], cases.applied[c]
+        speeds, dipole = cases.speeds[c], cases.rod_dipole[c]
+        inertia, inverse = mat3(cases.inertia[c]), mat3(cases.inertia_inverse[c])
+        body = RigidBody(inertia, inverse, cases.wheels[c], v.craft.body.substeps)
+        disturbances = with_dipole(v.craft.disturbances, row(cases.dipole, c))
+        craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipole, v.craft.disturbed)
+        key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
+        cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
+        gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
+        sensors = SensorsOfCase(key, cells, gyro_errors, magnetometer.draw_bias(v.sensors.magnetometer, key))
+        rotation, field_b, field_step = state.rotation, state.field_b, state.field_step
+        heading_state, attitude_state, control_state = state.heading, state.attitude, state.control
+        for k in range(marks.shape[0]):
+            step = first_step + k
+            environment = state_at(around.states, k)
+            dcm_bn = mrp_to_dcm(rotation.sigma_bn)
+            sun_b = multiply(dcm_bn, environment.sun_n)
+            light = around.light[min(k, around.light.shape[0] - 1)]
+            if v.own_earth:
+                light = cases.light[c]
+                _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
+            read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
+            if read.field_valid:
+                field_b, field_step = read.field_b, step
+            wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
+            known, predicted, sun_n, solar_flux, illumination = sky_at(around.sky, k)
+            sky_light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
+            sky = Sky(known, predicted, sun_n, solar_flux, illumination, sky_light)
+            field_is_new = v.heading_hears_field and read.field_valid
+            aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
+            heading_state, heading = estimate_heading(
+                v.heading, heading_state, state.heading_memory, since_s, voltages, aiding
+            )
+            # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
+            filtered_s = since_s if step > 0 else 0.0
+            aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid, speeds, False, sky)
+            attitude_state, attitude = estimate_attitude(
+                v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
+            )
+            # as the control node has it: the last measurement, for as long as the next may be on its way
+            field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
+            held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
+            control_state = command(v.control, control_state, since_s, heading, speeds, held, torque, dipole)
+            momentum_b = sum_along_axes(craft.body.wheels, momentum)
+            truth = Truth(
+                rotation.sigma_bn,
+                rotation.omega_bn_b,
+                sun_b,
+                v.array_normal_b,
+                momentum_b,
+                read.gyro_bias_b,
+                sum_of_sizes(dipole),
+            )
+            tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
+            if trace.shape[0] > 0:
+                _note(trace[c, step], rotation, dipole, torque, speeds)
+                note_estimate(tallies, heading, attitude, trace[c, step, TRUTH_COLUMNS:])
+            rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, applied)
+        for i in range(3):
+            cases.rates[c, i] = rotation.omega_bn_b[i]
+        after = CaseState(
+            rotation,
+            heading_state,
+            state.heading_memory,
+            attitude_state,
+            state.memory,
+            control_state,
+            field_b,
+            field_step,
         )
-        # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
-        filtered_s = since_s if step > 0 else 0.0
-        aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid, speeds, False, sky)
-        attitude_state, attitude = estimate_attitude(
-            v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
-        )
-        # as the control node has it: the last measurement, for as long as the next may be on its way
-        field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
-        held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
-        control_state = command(v.control, control_state, since_s, heading, speeds, held, torque, dipole)
-        momentum_b = sum_along_axes(craft.body.wheels, momentum)
-        truth = Truth(
-            rotation.sigma_bn,
-            rotation.omega_bn_b,
-            sun_b,
-            v.array_normal_b,
-            momentum_b,
-            read.gyro_bias_b,
-            sum_of_sizes(dipole),
-        )
-        tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
-        if trace.shape[0] > 0:
-            _note(trace[c, k], rotation, dipole, torque, speeds)
-            note_estimate(tallies, heading, attitude, trace[c, k, TRUTH_COLUMNS:])
-        rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, actuators.applied)
-    return rotation, heading_state, attitude_state, control_state, field_b, field_step
+        keep_state(states, c, like, after)
 
 
 @kernel

@@ -137,6 +137,12 @@ class MissionFlight:
         if self._own_earth:
             assert self._grid is not None
             earths = np.stack([earth_reflectivity.case_reflectivity(array, self._grid, key) for key in keys])
+        momentum = np.stack(
+            [
+                initial_conditions.initial_wheel_momentum(body, rotation.omega_bn_b, plant.initial.wheel_speed_rpm)
+                for body, rotation in zip(bodies, rotations, strict=True)
+            ]
+        )
         tables = Cases(
             seed_low=keys[0].seed_low,
             seed_high=keys[0].seed_high,
@@ -145,12 +151,13 @@ class MissionFlight:
             inertia_inverse=np.array([body.inertia_inverse for body in bodies]),
             dipole=np.array([initial_conditions.dispersed_dipole(plant, key) for key in keys]),
             wheels=np.stack([body.wheels for body in bodies]),
-            wheel_momentum=np.stack(
-                [
-                    initial_conditions.initial_wheel_momentum(body, rotation.omega_bn_b, plant.initial.wheel_speed_rpm)
-                    for body, rotation in zip(bodies, rotations, strict=True)
-                ]
-            ),
+            wheel_momentum=momentum,
+            torque=np.zeros_like(momentum),
+            applied=np.zeros_like(momentum),
+            speeds=np.zeros_like(momentum),
+            rod_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
+            voltages=np.zeros((len(keys), len(nominal))),
+            rates=np.zeros((len(keys), 3)),
             cells=cells,
             faults=self._faults(array, numbers),
             reflectivity=earths,
@@ -188,7 +195,6 @@ class MissionFlight:
     def _vehicle(self, done: list[Event]) -> Vehicle:
         values = {node.name: self._values_after(node, done) for node in self.mission.nodes}
         plant, array = values[self._plant.name], values[self._array.name]
-        craft = spacecraft(plant, self._key(0), plant.substeps)
         heading, attitude, control = (
             None if node is None else values[node.name] for node in (self._heading, self._filter, self._control)
         )
@@ -208,11 +214,7 @@ class MissionFlight:
             heading=_parameters(self._heading, heading),
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
-            disturbances=craft.disturbances,
-            disturbed=craft.disturbed,
-            rod_axes_b=craft.rod_axes_b,
-            rod_max_dipole=craft.rod_max_dipole,
-            substeps=plant.substeps,
+            craft=spacecraft(plant, self._key(0), plant.substeps),
             array_normal_b=(x, y, z),
         )
 

@@ -101,6 +101,13 @@ def test_another_estimator_takes_the_place_of_the_flown_one():
         configured(short(), estimator="ekff")
 
 
+def test_an_estimator_without_a_gyro_flies_with_it_on_alone():
+    mission = load_mission("esprit_2006")
+    assert configured(mission, estimator="triad").text() == mission.text()
+    with pytest.raises(MissionError, match=r"gyro off given, but triad uses no gyro; expected gyro on"):
+        configured(mission, estimator="triad", gyro=False)
+
+
 def test_a_mission_without_control_tumbles_on():
     nodes = ["css_sim/dynamics", "css_sim/css_array", "css_sim/gyro", "css_estimation/ekf"]
     log = fly_directly(short(f"graph.nodes={','.join(nodes)}"))

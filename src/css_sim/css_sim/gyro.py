@@ -12,8 +12,9 @@ from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4
 from css_common.schema import real
-from css_common.vectors import Mat3, Vec3, multiply
+from css_common.vectors import Mat3, Vec3, add, multiply
 from css_sim.random_walk import random_walk
+from css_sim.three_axes import draw_bias, read_out, reading_variance, with_noise
 
 _RADIANS_PER_SECOND = math.pi / 180.0 / 3600.0
 
@@ -61,7 +62,6 @@ class GyroErrors(NamedTuple):
 @kernel
 def draw_errors(p: Gyro, key: RandomKey) -> GyroErrors:
     """Errors of one case: bias, scale and misalignment."""
-    b = normal4(key, Stream.GYRO_BIAS, 0, 0)
     s = normal4(key, Stream.GYRO_BIAS, 0, 1)
     m = normal4(key, Stream.GYRO_BIAS, 0, 2)
     o = normal4(key, Stream.GYRO_BIAS, 0, 3)
@@ -71,7 +71,7 @@ def draw_errors(p: Gyro, key: RandomKey) -> GyroErrors:
         (t * m[2], 1.0 + d * s[1], t * m[3]),
         (t * o[0], t * o[1], 1.0 + d * s[2]),
     )
-    return GyroErrors((p.bias * b[0], p.bias * b[1], p.bias * b[2]), response)
+    return GyroErrors(draw_bias(p.bias, key, Stream.GYRO_BIAS), response)
 
 
 @kernel
@@ -85,25 +85,10 @@ def bias_at(p: Gyro, errors: GyroErrors, key: RandomKey, step: int) -> Vec3:
 
 
 @kernel
-def _read_out(p: Gyro, rate: float) -> float:
-    if p.resolution > 0.0:
-        rate = p.resolution * math.floor(rate / p.resolution + 0.5)
-    if p.range > 0.0:
-        rate = min(max(rate, -p.range), p.range)
-    return rate
-
-
-@kernel
 def read(p: Gyro, errors: GyroErrors, bias_b: Vec3, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
     """Measured body rate [rad/s] at a control cycle, with the bias of that cycle (`bias_at`)."""
-    w = multiply(errors.response, omega_bn_b)
-    x, y, z = w[0] + bias_b[0], w[1] + bias_b[1], w[2] + bias_b[2]
-    if p.noise > 0.0:
-        n = normal4(key, Stream.GYRO_NOISE, step, 0)
-        x += p.noise * n[0]
-        y += p.noise * n[1]
-        z += p.noise * n[2]
-    return (_read_out(p, x), _read_out(p, y), _read_out(p, z))
+    rate = with_noise(p.noise, key, Stream.GYRO_NOISE, step, add(multiply(errors.response, omega_bn_b), bias_b))
+    return read_out(p.resolution, p.range, rate)
 
 
 @kernel
@@ -114,4 +99,4 @@ def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: 
 
 def variance(p: Gyro) -> float:
     """Variance of a reading about the true rate [rad^2/s^2], per axis: noise, initial bias and rounding."""
-    return p.noise**2 + p.bias**2 + p.resolution**2 / 12.0
+    return reading_variance(p.noise, p.bias, p.resolution)

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Three-axis magnetometer: bias, white noise, resolution and range on the field in the body frame."""
 
-import math
 from typing import NamedTuple
 
 from css_common.conversions import tesla
 from css_common.declared import builder, made, table_of
 from css_common.kernel import kernel
-from css_common.random_streams import RandomKey, Stream, normal4
+from css_common.random_streams import RandomKey, Stream
 from css_common.schema import real
-from css_common.vectors import Vec3, scale
+from css_common.vectors import Vec3, add
+from css_sim import three_axes
+from css_sim.three_axes import read_out, reading_variance, with_noise
 
 
 class Magnetometer(NamedTuple):
@@ -34,31 +35,16 @@ parameters = builder(Magnetometer)
 @kernel
 def draw_bias(p: Magnetometer, key: RandomKey) -> Vec3:
     """Bias of one case [T]."""
-    n = normal4(key, Stream.MAGNETOMETER_BIAS, 0, 0)
-    return scale(p.bias, (n[0], n[1], n[2]))
-
-
-@kernel
-def _read_out(p: Magnetometer, field: float) -> float:
-    if p.resolution > 0.0:
-        field = p.resolution * math.floor(field / p.resolution + 0.5)
-    if p.range > 0.0:
-        field = min(max(field, -p.range), p.range)
-    return field
+    return three_axes.draw_bias(p.bias, key, Stream.MAGNETOMETER_BIAS)
 
 
 @kernel
 def measure(p: Magnetometer, bias_b: Vec3, key: RandomKey, step: int, field_b: Vec3) -> Vec3:
     """Measured field [T] at a control cycle."""
-    x, y, z = field_b[0] + bias_b[0], field_b[1] + bias_b[1], field_b[2] + bias_b[2]
-    if p.noise > 0.0:
-        n = normal4(key, Stream.MAGNETOMETER_NOISE, step, 0)
-        x += p.noise * n[0]
-        y += p.noise * n[1]
-        z += p.noise * n[2]
-    return (_read_out(p, x), _read_out(p, y), _read_out(p, z))
+    field_b = with_noise(p.noise, key, Stream.MAGNETOMETER_NOISE, step, add(field_b, bias_b))
+    return read_out(p.resolution, p.range, field_b)
 
 
 def variance(p: Magnetometer) -> float:
     """Variance of a reading about the true field [T^2], per axis: noise, bias and rounding."""
-    return p.noise**2 + p.bias**2 + p.resolution**2 / 12.0
+    return reading_variance(p.noise, p.bias, p.resolution)

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Safe-hold Sun heading from flat cells."""
 
-from collections.abc import Iterable
 from typing import ClassVar
 
 from css_common.run import node_main
-from css_common.schema import Values
 from css_estimation.sun import flat_cells
 from css_estimation.sun.safe_hold import MODE_NAMES
 from css_estimation.sun.sun_algorithm import SunAlgorithm
@@ -18,10 +16,6 @@ class Flat(SunEstimator):
     algorithm: ClassVar[SunAlgorithm] = flat_cells
     parameters = flat_cells.PARAMETERS
     mode_names = MODE_NAMES
-
-    @classmethod
-    def conflicts(cls, values: Values) -> Iterable[str]:
-        return flat_cells.conflicts(values)
 
 
 main = node_main(Flat)

@@ -1,11 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Safe-hold Sun heading from a collared pyramid of cells, or flat ones where it does not see the Sun."""
 
-from collections.abc import Iterable
 from typing import ClassVar
 
 from css_common.run import node_main
-from css_common.schema import Values
 from css_estimation.sun import pyramid_switch
 from css_estimation.sun.safe_hold import MODE_NAMES
 from css_estimation.sun.sun_algorithm import SunAlgorithm
@@ -19,10 +17,6 @@ class PyramidSwitch(SunEstimator):
     algorithm: ClassVar[SunAlgorithm] = pyramid_switch
     parameters = pyramid_switch.PARAMETERS
     mode_names = MODE_NAMES
-
-    @classmethod
-    def conflicts(cls, values: Values) -> Iterable[str]:
-        return pyramid_switch.conflicts(values)
 
 
 main = node_main(PyramidSwitch)

@@ -77,7 +77,7 @@ class FlightSky:
 
 
 def flight_sky(values: Values) -> FlightSky | None:
-    """The sky that a Sun estimator's values ask for; None when the cells decide on eclipse and nobody needs the rest."""
+    """The sky that a Sun estimator's values ask for; None when cells decide on eclipse and nobody needs the rest."""
     uses_light = hasattr(values, "use_orbit") and values[USE_ORBIT] and values.orbit.source != "none"
     if not uses_light and values.eclipse.source == "sensors":
         return None

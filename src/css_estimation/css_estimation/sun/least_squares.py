@@ -31,7 +31,7 @@ from css_common.schema import Values, choice, flag, real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, subtract
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import brightest, cell_layout, missing_cells
-from css_estimation.sun.lit_cells import Gate, lit_cells
+from css_estimation.sun.lit_cells import CELL_SIGMA, Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, Covariance, SunHeading
@@ -73,18 +73,7 @@ class LeastSquaresParameters(NamedTuple):
         lambda condition: condition**-2.0,
         real("largest_condition", 10.0, "-", "condition number beyond which a direction is unknown", low=3.0, high=1e3),
     )
-    cell_sigma: float = given(
-        real(
-            "cell_sigma",
-            0.1,
-            "-",
-            "cell error, all causes, 1 sigma",
-            low=0.0,
-            open_low=True,
-            high=10.0,
-            tunable=True,
-        )
-    )
+    cell_sigma: float = given(CELL_SIGMA)
     patterns: np.ndarray = computed(_patterns, _USE_DARK_CELLS)  # (P,) of sun_patterns.PATTERN; empty: not used
     snapshot: SnapshotParameters = part(SnapshotParameters)
 

@@ -13,6 +13,11 @@ from css_common.kernel import kernel
 from css_common.schema import choice, real
 from css_estimation.sun.cell_layout import READABLE
 
+CELL_SIGMA = real(
+    "cell_sigma", 0.1, "-", "cell error, all causes, 1 sigma", low=0.0, open_low=True, high=10.0, tunable=True
+)
+"""Parameter of estimators whose covariance follows from the cells' errors."""
+
 
 class Gate(NamedTuple):
     """Which cells see the Sun."""

@@ -12,6 +12,8 @@ class SunAlgorithm(Protocol):
     """A module such as `wavg`.
 
     What `parameters` gives is a NamedTuple that the module itself defines: by its type the Monte Carlo finds it.
+    A module may also have `conflicts(values)`, as `Component.conflicts`, and `heading_gain(values)`, the share of a new
+    measurement in its estimate, for the check of the control's gains.
     """
 
     @property

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A Sun estimator as a component of the graph; a node file only names the algorithm."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -65,6 +65,11 @@ class SunEstimator(Component):
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
         return ("cells.normals",) if values[SOURCE] == "sensors" else ("cells.normals", "orbit.source")
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        of_algorithm = getattr(cls.algorithm, "conflicts", None)
+        return () if of_algorithm is None else of_algorithm(values)
 
     @classmethod
     def smoothing(cls, values: Values) -> Smoothing:

@@ -34,7 +34,7 @@ from css_common.vectors import Vec3
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import READABLE, CellLayout, brightest, cell_layout, is_opposed, missing_cells, sees
 from css_estimation.sun.eclipse_detector import detect_eclipse
-from css_estimation.sun.lit_cells import Gate
+from css_estimation.sun.lit_cells import CELL_SIGMA, Gate
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
@@ -60,9 +60,6 @@ MODE_COASTING = 4
 _LARGEST_READING = 2.0
 
 
-_CELL_SIGMA = real(
-    "cell_sigma", 0.1, "-", "cell error, all causes, 1 sigma", low=0.0, open_low=True, high=10.0, tunable=True
-)
 _PROCESS_SIGMA = real(
     "process_sigma", 0.01, "rad/sqrt(s)", "drift of the Sun line, 1 sigma", low=0.0, high=10.0, tunable=True
 )
@@ -85,7 +82,7 @@ class EkfParameters(NamedTuple):
         ),
         real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True),
     )
-    cell_variance: float = made(square, _CELL_SIGMA)
+    cell_variance: float = made(square, CELL_SIGMA)
     process_noise: float = made(square, _PROCESS_SIGMA)
     process_noise_without_rate: float = made(
         square,
@@ -131,7 +128,7 @@ def heading_gain(values: Values) -> float:
 
     P = P - P^2 / (P + R) + Q h, solved for the covariance P before an update.
     """
-    q, r = values[_PROCESS_SIGMA] ** 2 * values.mission.period, values[_CELL_SIGMA] ** 2
+    q, r = values[_PROCESS_SIGMA] ** 2 * values.mission.period, values[CELL_SIGMA] ** 2
     before = 0.5 * (q + math.sqrt(q * q + 4.0 * q * r))
     return before / (before + r)
 

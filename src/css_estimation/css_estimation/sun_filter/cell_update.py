@@ -3,7 +3,8 @@
 
 The model of cell i with the normal n_i,
 
-    V_i = dark_i + gain_i (1 + g_i) scale (1 + SCALE + COMMON) R(flux max(0, n_i.s) seen_i + a_i (1 + EARTH) + c a_i u_i),
+    V_i = dark_i + gain_i (1 + g_i) scale (1 + SCALE + COMMON) R(light_i),
+    light_i = flux max(0, n_i.s) seen_i + a_i (1 + EARTH) + c a_i u_i,
 
 R being the response, a_i the light of the mean Earth at the estimated attitude, u_i what clouds add to it in units of
 c a_i. Where the Earth is not predicted a_i is half of its largest, and its error is white noise.
@@ -48,8 +49,8 @@ READABLE = 1e3
 _MARGIN_LEAST, _MARGIN_BY_SIGMA, _MARGIN_MOST = 0.03, 2.0, 0.15
 # A step in the output smaller than this is none.
 _SMALLEST_STEP = 0.05
-# Below so many standard deviations of noise a cell that does not see the Sun is dark and says nothing. That is decided by what is expected: to
-# decide by the reading would keep the high ones of a dim cell alone. A reading so much higher cannot be noise.
+# Below so many standard deviations of noise a cell that does not see the Sun is dark and says nothing. What is expected
+# decides that: the reading would keep the high ones of a dim cell alone. One so much higher cannot be noise.
 _DARK, _SURELY_LIT = 3.0, 4.0
 # Without a converged heading nothing is refused [rad].
 _CONVERGED = 0.3

@@ -71,7 +71,7 @@ def _plus(row: Vec3, k: float, v: Vec3) -> Vec3:
 def begin(
     p: SunFilterParameters, m: SunFilterMemory, sun_b: Vec3, variance: float, sun_n: Vec3, model: int, wheels_b: Vec3
 ) -> None:
-    """One hypothesis from a direction of the Sun in b, known to a variance [rad2]; its turn is a matter of definition."""
+    """One hypothesis from a direction of the Sun in b, known to a variance [rad2]; its turn is a definition."""
     x, covariance = m.estimates[0], m.covariances[0]
     set_dcm(x, onto_sun(sun_b, sun_n))
     for i in range(X_RATE, x.shape[0]):

@@ -136,7 +136,7 @@ def go_on(p: Motion, model: int, gyro_b: Vec3, wheels_b: Vec3, dt: float, states
         by_rate, kept = scaled(-dt, transpose(dcm_bn)), IDENTITY
         attitude_noise, rate_noise = p.gyro_noise * dt * dt, 0.0
     else:
-        inertia, inverse = _inertia(p, model)
+        _, inverse = _inertia(p, model)
         wheels_b = wheels_b if model == RATE_BY_MOMENTUM else (0.0, 0.0, 0.0)
         momentum_b = triple(x, X_RATE)
         # the rate in the middle of the step: the momentum as it will have turned by then
@@ -174,7 +174,9 @@ def go_on(p: Motion, model: int, gyro_b: Vec3, wheels_b: Vec3, dt: float, states
 
 
 @kernel
-def fade(first: int, x_first: int, count: int, time: float, variance: float, dt: float, states: int, x, covariance):
+def fade(
+    first: int, x_first: int, count: int, time: float, variance: float, dt: float, states: int, x, covariance
+) -> None:
     """Lets errors that forget themselves within `time` [s] (Gauss-Markov of first order) go on by `dt` [s]."""
     kept = math.exp(-dt / time)
     for b in range(count):

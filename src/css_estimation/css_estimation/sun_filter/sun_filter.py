@@ -41,6 +41,7 @@ from css_estimation.sun.sun_heading import (
     SunHeading,
 )
 from css_estimation.sun.sun_tracking import elapsed
+from css_estimation.sun_filter import options
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
 from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen_roll, weigh
@@ -72,7 +73,7 @@ from css_estimation.sun_filter.motion import (
     rate_model,
     wheel_momentum,
 )
-from css_estimation.sun_filter.options import PARAMETERS, SunFilterParameters
+from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.sun_search import cost, least_cost, search
 
 MODE_WAITING = 0
@@ -98,6 +99,7 @@ _CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told t
 _MOST = 4.0  # [rad2] reported variance
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
 
+PARAMETERS = options.PARAMETERS
 _built = builder(SunFilterParameters)
 
 
@@ -225,7 +227,7 @@ def _sunlight(p: SunFilterParameters, aiding: Aiding, largest: float) -> tuple[f
 
 @kernel
 def _filtered_rate(p: SunFilterParameters, rate: Rate, cycle: Cycle, raw_b: Vec3) -> Rate:
-    """The rate as reported: a gyro's through the low-pass filter, another as it is, since the filter has smoothed it."""
+    """The rate as reported: a gyro's through the low-pass filter, another as it is: the filter has smoothed it."""
     omega_bn_b = raw_b
     if cycle.model == RATE_BY_GYRO:
         omega_bn_b = low_pass(rate.omega_bn_b, raw_b, low_pass_gain(p.motion.cutoff, cycle.dt))
@@ -355,9 +357,19 @@ def _track(
             if earth_known:
                 loosen_roll(covariance, sun_n, before.since, dt)
             read = read_cells(
-                p, voltages, sun_n, cycle.flux, more_noise, earth_known, aiding.sky.light, states, x, covariance, memory.earth,
+                p,
+                voltages,
+                sun_n,
+                cycle.flux,
+                more_noise,
+                earth_known,
+                aiding.sky.light,
+                states,
+                x,
+                covariance,
+                memory.earth,
                 memory.work,
-            )  # fmt: skip
+            )
             weigh(memory, k, read.likelihood)
             if k == best:
                 reading = read

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where is the Sun? Weights of directions over the whole sphere, for a filter that has no estimate to begin with.
 
-They are weighed by what the cells read: one lit cell leaves a ring, several a spot. With a gyro weights gather while the
-body turns, in a frame that turns with it; without, they forget within a second. Mean and spread of them are an estimate
-too, the only one while the spread is large; once it is small the filter begins from it.
+They are weighed by what the cells read: one lit cell leaves a ring, several a spot. With a gyro weights gather while
+the body turns, in a frame that turns with it; without, they forget within a second. Mean and spread of them are an
+estimate too, the only one while the spread is large; once it is small the filter begins from it.
 """
 
 import math

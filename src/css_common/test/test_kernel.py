@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A kernel gives the same to Python and to kernels; constants that it is called with make no copies of it."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from numba import int64, typeof
+from numba.core.errors import NumbaError
+
+from css_common.kernel import kernel, outer_kernel, study_kernel
+
+
+class Point(NamedTuple):
+    """What a kernel is handed."""
+
+    x: float
+    y: float
+
+
+@kernel
+def weighted(p, weight, offset=1.0):
+    return weight * p.x - p.y / offset
+
+
+@kernel
+def three_times(p):
+    return weighted(p, 1), weighted(p, 2), weighted(p, 3, offset=7.0)
+
+
+@study_kernel
+def in_a_study(p):
+    return three_times(p)
+
+
+@outer_kernel
+def in_an_outermost_loop(p):
+    return three_times(p)
+
+
+@kernel
+def same_table(table):
+    return table
+
+
+@kernel
+def first_of_table(table):
+    return same_table(table)[0]
+
+
+@pytest.mark.parametrize("caller", [three_times, in_a_study, in_an_outermost_loop])
+def test_calls_from_kernels_give_what_calls_from_python_give(caller):
+    p = Point(0.1, 0.7)
+    assert caller(p) == (weighted(p, 1), weighted(p, 2), weighted(p, 3, offset=7.0))
+    assert weighted(p, 3, offset=7.0) == weighted.py_func(p, 3, offset=7.0)
+
+
+def test_constants_in_calls_make_no_copies_of_a_kernel():
+    three_times(Point(1.0, 2.0))
+    point = typeof(Point(1.0, 2.0))
+    template, *_ = weighted.get_call_template((point, int64), {})
+    versions = [signature.args for signature in template.cases if signature.args[0] == point]
+    assert len(versions) == 2, "with and without the last argument"
+    assert {weight for _, weight, _ in versions} == {int64}
+
+
+def test_a_kernel_that_returns_an_array_is_refused_whoever_calls_it():
+    reason = "same_table: a kernel must not return an array"
+    with pytest.raises(TypeError, match=reason):
+        same_table(np.zeros(3))
+    with pytest.raises((TypeError, NumbaError), match=reason):
+        first_of_table(np.zeros(3))
