@@ -7,6 +7,7 @@ Everything is measured against the truth; without a truth in the log every quant
 sunlit          more than half of the solar disc is in view (truth.illumination > 0.5).
 power positive  the true Sun is within 30 deg of the array normal.
 acquisition     the first moment from which the flight stays sunlit and power positive for 60 s.
+dawn            the first 60 s of sunlight after an eclipse.
 detumbled       the first moment from which the body rate stays below `measures.detumbled_rate_deg_s` for 60 s.
 
 Imported telemetry says nothing about solar arrays and orbit: nothing is told of pointing and acquisition, and errors
@@ -28,6 +29,8 @@ ACQUIRED_AFTER = 60.0
 """Power-positive time [s] that makes an acquisition."""
 FINAL_TIME = 60.0
 """Time [s] at the end of the flight over which the final rate is averaged."""
+DAWN_TIME = 60.0
+"""Time [s] of sunlight after an eclipse in which an estimator has to find its way back."""
 
 
 class Windows(NamedTuple):
@@ -59,6 +62,15 @@ def _lasting(log: FlightLog, flags: np.ndarray) -> int | None:
         if _span(log, first, last) >= ACQUIRED_AFTER - 0.01 * log.period:
             return first
     return None
+
+
+def dawn_steps(sunlit: np.ndarray, period_s: float) -> np.ndarray:
+    """(K,) True within `DAWN_TIME` of sunlight after an eclipse, of steps (K,) that are sunlit or not."""
+    dawn = np.zeros(len(sunlit), bool)
+    for first, last in _runs(sunlit):
+        if first > 0:
+            dawn[first : min(last + 1, first + round(DAWN_TIME / period_s))] = True
+    return dawn
 
 
 class Pass(NamedTuple):
@@ -186,6 +198,20 @@ class EstimatorMeasures:
             return None
         steps, errors = self._headings
         return _mean_deg(errors[self._log.sunlit[steps]])
+
+    def heading_error_eclipse_deg(self) -> float | None:
+        """Mean heading error in eclipse."""
+        if self._headings is None or not self.flight.knows_arrays:
+            return None
+        steps, errors = self._headings
+        return _mean_deg(errors[~self._log.sunlit[steps]])
+
+    def heading_error_dawn_deg(self) -> float | None:
+        """Mean heading error in the first minute after an eclipse."""
+        if self._headings is None or not self.flight.knows_arrays or self._log.period == 0.0:
+            return None
+        steps, errors = self._headings
+        return _mean_deg(errors[dawn_steps(self._log.sunlit, self._log.period)[steps]])
 
     def attitude_error_mean_deg(self) -> float | None:
         """Mean attitude error of a settled filter."""

@@ -224,6 +224,25 @@ _POWER_LATE = Quantity(
     measure=lambda m: m.flight.power_positive_late(),
     tally=_mean("late_within", "late_lit"),
 )
+_NO_ECLIPSE = "there was no eclipse, or no estimate in it and after it"
+_ECLIPSE = Quantity(
+    "heading_error_eclipse_deg",
+    "deg",
+    "mean angle of estimated to true Sun in eclipse",
+    heading="in\neclipse\n",
+    without_value=_NO_ECLIPSE,
+    measure=EstimatorMeasures.heading_error_eclipse_deg,
+    tally=_mean("dark_sum", "dark"),
+)
+_DAWN = Quantity(
+    "heading_error_dawn_deg",
+    "deg",
+    "mean angle of estimated to true Sun in the first 60 s of sunlight after an eclipse",
+    heading="minute\nafter\nit",
+    without_value=_NO_ECLIPSE,
+    measure=EstimatorMeasures.heading_error_dawn_deg,
+    tally=_mean("dawn_sum", "dawn"),
+)
 _LATE = Quantity(
     "heading_error_late_deg",
     "deg",
@@ -372,6 +391,8 @@ def quantities(windows: Windows) -> tuple[Quantity, ...]:
         *(_safe_mode(windows) if windows.detumbled_rate_deg_s > 0.0 else ()),
         _HEADING_MEAN,
         _HEADING_P95,
+        _ECLIPSE,
+        _DAWN,
         *((_LATE,) if windows.late_time > 0.0 else ()),
         *_ATTITUDE,
         *_POINTING,
@@ -434,6 +455,8 @@ def summaries(windows: Windows) -> tuple[Summary, ...]:
     return (
         _mean_over_cases(_HEADING_MEAN),
         _mean_over_cases(_HEADING_P95),
+        _mean_over_cases(_ECLIPSE),
+        _mean_over_cases(_DAWN),
         Summary("power_positive_fraction", "acquired_s", "share", "power\nposi-\ntive\n", "", "{:.1%}"),
         Summary("converging_mean_s", "converging_s", "mean", "con-\nverging\nmean", "s", "{:.1f}"),
         Summary("converging_max_s", "converging_s", "max", "con-\nverging\nmax", "s", "{:.1f}"),

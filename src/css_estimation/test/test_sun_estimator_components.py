@@ -72,7 +72,7 @@ def test_message_fits_its_type(kind):
 @KINDS
 def test_topics(kind):
     values = values_of(kind, cells__normals=[0.0, 0.0, 1.0])
-    voltages, gyro = kind.inputs("left", values)
+    voltages, gyro, *_ = kind.inputs("left", values)
     assert (voltages.topic, voltages.lengths, voltages.required) == ("css/voltages", {"voltages": 1}, True)
     assert (gyro.topic, gyro.required) == ("gyro/imu", False)
     (output,) = kind.outputs("left", values)

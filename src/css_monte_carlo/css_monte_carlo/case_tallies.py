@@ -11,7 +11,7 @@ import numpy as np
 
 from css_analysis.estimate_errors import tangent_nees_of
 from css_analysis.flight_log import SUNLIT_FRACTION
-from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITIVE, Windows
+from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITIVE, Windows, dawn_steps
 from css_common.kernel import kernel
 from css_common.vectors import angle_between, norm, subtract
 from css_estimation.sun.sun_heading import VALIDITY_NONE, SunHeading
@@ -21,7 +21,7 @@ REPORT_SPAN = 60.0
 """Time [s] before `Windows.report_time` over which rates are averaged."""
 
 # What is special about a step, the same for all cases.
-SUNLIT, FIRST_PASS, LATE, REPORTED, FINAL = 1, 2, 4, 8, 16
+SUNLIT, FIRST_PASS, LATE, REPORTED, FINAL, DAWN = 1, 2, 4, 8, 16, 32
 
 BIN_DEG = 0.02
 """Width of the bins from which percentiles over time come."""
@@ -45,6 +45,8 @@ TALLY = np.dtype(
             "headings",  # sunlit steps after acquisition with an estimate, and the sums over them
             "pointings",
             "sunlit_headings",  # sunlit steps with an estimate, those before acquisition included
+            "dark",  # steps in eclipse with an estimate
+            "dawn",  # steps in the first minute of sunlight after an eclipse with an estimate
             "late",
             "late_lit",  # late steps, and those of them within 30 deg
             "late_within",
@@ -67,6 +69,8 @@ TALLY = np.dtype(
             "sunlit_heading_sum",
             "sunlit_pointing_sum",
             "late_sum",
+            "dark_sum",
+            "dawn_sum",
             "reported_sum",
             "reported_knowledge_sum",
             "final_sum",
@@ -124,10 +128,11 @@ def sample_count(steps: int, sample_every: int) -> int:
 
 
 def step_marks(illumination: np.ndarray, period_s: float, windows: Windows) -> np.ndarray:
-    """(K,) marks SUNLIT, FIRST_PASS, LATE, REPORTED and FINAL of the steps of a flight."""
+    """(K,) marks SUNLIT, FIRST_PASS, LATE, REPORTED, FINAL and DAWN of the steps of a flight."""
     steps = np.arange(len(illumination))
     lit = illumination > SUNLIT_FRACTION
     marks = np.where(lit, SUNLIT, 0)
+    marks |= np.where(dawn_steps(lit, period_s), DAWN, 0)
     if lit.any():
         begin = int(np.argmax(lit))
         end = begin + int(np.argmin(lit[begin:])) if not lit[begin:].all() else len(lit)
@@ -169,9 +174,15 @@ def tally_step(
     sampled = step % tallies.sample_every == 0
     if not sunlit:
         t.run = 0
+    error = _DEG * angle_between(heading.sun_b, sun_b) if estimated else math.nan
+    if estimated and not sunlit:
+        t.dark += 1
+        t.dark_sum += error
+    if estimated and (marks & DAWN) != 0:
+        t.dawn += 1
+        t.dawn_sum += error
     if sunlit or sampled:
         pointing = _DEG * angle_between(sun_b, truth.array_normal_b)
-        error = _DEG * angle_between(heading.sun_b, sun_b) if estimated else math.nan
         if sunlit:
             _tally_sunlit(tallies, c, step, marks, pointing, error)
         if sampled:

@@ -55,7 +55,7 @@ def cost(p: SunFilterParameters, voltages, flux: float, sun_b: Vec3) -> float:
 def search(
     p: SunFilterParameters, grid, dcm_bn: Mat3, voltages, flux: float, dt: float, turns: bool
 ) -> tuple[Vec3, float]:
-    """Adds a cycle's outputs to the weights; gives the mean direction, in n, and the variance about it on the worst axis.
+    """Adds a cycle's outputs to the weights; gives the mean direction in n, and the variance on the worst axis.
 
     Args:
         grid: (DIRECTIONS,) logarithms, advanced.

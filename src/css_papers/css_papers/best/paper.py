@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the Sun filter attains, flown in the mission `okeefe_sun_filter` and changes of it."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pyarrow as pa
+
+from css_common.mission import load_mission
+from css_monte_carlo.study import run_study
+from css_papers.best.scenarios import FILTER, MISSION, Scenario, scenarios
+from css_papers.page import Listing, Page, Section, Table, write_page
+from css_papers.papers import Request
+from css_papers.rows import Must, Row, notes_of, number, row, table_of
+from css_papers.study_columns import column
+
+TITLE = "What the Sun filter attains: clouds, dusk, other layouts, no gyro"
+
+_CONSISTENT = Must(0.8, 1.2)
+_ECLIPSE = Must(None, 2.0)
+_FOUND = Must(1.0)
+
+_COLUMNS = (
+    ("heading error, sunlit [deg]", "heading_error_mean_deg"),
+    ("95 % [deg]", "heading_error_p95_deg"),
+    ("from the first light on [deg]", "heading_error_sunlit_deg"),
+    ("in eclipse [deg]", "heading_error_eclipse_deg"),
+    ("minute after it [deg]", "heading_error_dawn_deg"),
+    ("NEES / 2 (1)", "nees_mean"),
+    ("NIS / dof (1)", "nis_mean"),
+    ("longest converging [s]", "converging_s"),
+)
+
+
+def reproduce(request: Request) -> list[Row]:
+    """Flies all scenarios with gyro and without, and writes the page; without the side ones when it must be quick."""
+    mission = load_mission(MISSION)
+    flown = [scenario for scenario in scenarios() if not (request.quick and scenario.side)]
+    rows: list[Row] = []
+    lines = []
+    spent = []
+    for scenario in flown:
+        name = "".join(c if c.isalnum() else "_" for c in scenario.label)
+        configurations = [scenario.configuration(gyro) for gyro in (True, False)]
+        progress = None if request.progress is None else request.progress(scenario.label)
+        folder = request.folder / "studies" / f"{name}_{request.cases}"
+        study = run_study(mission, configurations, request.cases, folder, progress=progress)
+        rows += _rows(scenario, study.cases)
+        lines += list(_lines(scenario, study.cases))
+        if study.flown:
+            spent.append(f"{scenario.label}: {1e6 * study.cpu_s / study.flown:.1f} us a case and step, all of the loop")
+    missed = sum(not line.ok for line in rows)
+    summary = f"{len(rows)} numbers, {missed or 'none'} of them not what they must be."
+    heading = ["", *(title for title, _ in _COLUMNS)]
+    sections = [
+        Section("Numbers", [summary, Table(*table_of(rows)), Listing(notes_of(rows))]),
+        Section("All scenarios", [Table(heading, lines)]),
+        Section("What is measured", [Listing(_DEFINITIONS)]),
+    ]
+    if spent:
+        sections.append(Section("Processor time of this run", [Listing(spent)]))
+    lead = (
+        f"{request.cases} cases of one orbit for each scenario, with gyro and without, closed loop. Attitude, rate, "
+        "noise and the clouds of every 5 deg cell of the Earth are drawn for each case; the Earth is half as bright "
+        "again as the filter's mean one. The filter knows its orbit but where it is said."
+    )
+    write_page(Page(TITLE, lead, sections), request.folder)
+    return rows
+
+
+_DEFINITIONS = (
+    "heading error, sunlit: mean over the cases of the mean over sunlight after acquisition; 95 %: mean of percentiles",
+    "from the first light on: the same with the search for the Sun",
+    "NEES: mean over the whole flight, eclipse included, across the Sun line, for each of two degrees of freedom",
+    "NIS: normalised innovations squared for each degree of freedom, over the steps that had some",
+    "NEES below its range: error bars too wide, as in eclipse without gyro for a torque that this truth does not have",
+)
+
+
+def _rows(scenario: Scenario, cases: pa.Table) -> list[Row]:
+    """What is asked of the Sun filter; of others nothing is."""
+    if scenario.estimator != FILTER:
+        return []
+    rows = []
+    for gyro in (True, False):
+        values = {name: column(cases, scenario.configuration(gyro), name) for _, name in _COLUMNS}
+        label, variant = scenario.label, "gyro" if gyro else "no gyro"
+        must = None if scenario.error_must is None else Must(None, scenario.error_must)
+        error = row(
+            f"{label}: heading error", "deg", None, _mean(values["heading_error_mean_deg"]), must, variant=variant
+        )
+        rows.append(error)
+        if must is None:
+            continue
+        eclipse, nees = _mean(values["heading_error_eclipse_deg"]), _mean(values["nees_mean"])
+        acquired = column(cases, scenario.configuration(gyro), "acquired_s")
+        rows += [
+            row(f"{label}: in eclipse", "deg", None, eclipse, _ECLIPSE, variant=variant),
+            row(f"{label}: NEES for each of 2", "-", None, nees, _CONSISTENT, variant=variant),
+            row(f"{label}: NIS for each", "-", None, _mean(values["nis_mean"]), _CONSISTENT, variant=variant),
+            row(f"{label}: Sun found", "-", None, float(np.mean(np.isfinite(acquired))), _FOUND, variant=variant),
+        ]
+    return rows
+
+
+def _lines(scenario: Scenario, cases: pa.Table) -> Iterator[list[str]]:
+    for gyro in (True, False):
+        configuration = scenario.configuration(gyro)
+        values = []
+        for _, name in _COLUMNS:
+            of_cases = column(cases, configuration, name)
+            values.append(float(np.nanmax(of_cases)) if name == "converging_s" and len(of_cases) else _mean(of_cases))
+        yield [f"{scenario.label}, {'gyro' if gyro else 'no gyro'}", *(number(value) for value in values)]
+
+
+def _mean(values: np.ndarray) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if len(known) else None

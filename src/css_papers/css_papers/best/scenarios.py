@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What flies: the spacecraft of O'Keefe & Schaub under clouds that no flight knows, and what may be otherwise."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from css_monte_carlo.study import Configuration
+from css_papers.best.layouts import layouts
+
+MISSION = "okeefe_sun_filter"
+FILTER = "sun_filter"
+
+_UNCALIBRATED = {
+    "css_array.scale_cell_error": "0.02",
+    "css_array.misalignment_deg": "1",
+}
+_TOLD = {f"{FILTER}.gain_sigma": "0.02", f"{FILTER}.tilt_sigma_deg": "1"}
+
+
+class Scenario(NamedTuple):
+    """One line of the page."""
+
+    label: str
+    settings: Mapping[str, str]
+    error_must: float | None = None  # [deg] largest mean heading error in sunlight
+    estimator: str = FILTER
+    side: bool = False  # left out when it must be quick
+
+    def configuration(self, gyro: bool) -> Configuration:
+        """How it flies."""
+        return Configuration(self.estimator, gyro, tuple(f"{key}={value}" for key, value in self.settings.items()))
+
+
+_LARGEST = {"six faces": 1.0}
+
+
+def scenarios() -> list[Scenario]:
+    """All of the page, in its order."""
+    cells = layouts()
+    return [
+        Scenario("calibrated cells, clouds per case", {}, 0.3),
+        Scenario("the paper's filter (ekf)", {}, estimator="ekf"),
+        Scenario("the paper's average (wavg)", {}, estimator="wavg"),
+        Scenario("gains 2 %, tilts 1 deg, uncalibrated", _UNCALIBRATED | _TOLD, 1.3),
+        Scenario("an Earth 1.5 times as bright again", {"css_array.albedo.factor": "2.25"}, side=True),
+        Scenario("all clouds in common", {"css_array.albedo.draw": "common"}, side=True),
+        Scenario("another model of the Earth", {f"{FILTER}.albedo.reflectivity": "knocke"}, side=True),
+        Scenario("place unknown", {f"{FILTER}.use_orbit": "false"}),
+        *(_orbit(raan, month) for raan, month in ((0, "03"), (180, "09"), (300, "12"))),
+        *(
+            Scenario(name, layout.settings, _LARGEST.get(name), side=name != "six faces")
+            for name, layout in cells.items()
+        ),
+        Scenario("six faces, paper's filter (ekf)", cells["six faces"].settings, estimator="ekf", side=True),
+    ]
+
+
+def _orbit(raan: int, month: str) -> Scenario:
+    settings = {"orbit.raan_deg": str(raan), "mission.epoch": f"2013-{month}-21T00:00:00Z"}
+    return Scenario(f"node at {raan} deg, 21 {_MONTHS[month]}", settings, 0.3, side=True)
+
+
+_MONTHS = {"03": "March", "09": "September", "12": "December"}
