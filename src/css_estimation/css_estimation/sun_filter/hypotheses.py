@@ -40,11 +40,11 @@ _ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
 _ROLL_VARIANCE = 0.2**2
 _HEADING_VARIANCE = 0.05**2
 _SEARCH_VARIANCE = 0.1**2
-# Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: its
-# variance is kept above one that falls within this time [s] ...
+# Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: its variance
+# is kept above one that falls within this time [s] ...
 _SETTLING = 60.0
-# ... and goes on to grow, by what correlated clouds do [rad2/s].
-_ROLL_NOISE = 1e-5
+# ... and both go on to grow, by what clouds do that last, and what a wrong turn made of the Earth's light [rad2/s].
+_ROLL_NOISE, _HEADING_NOISE = 1e-5, 1e-7
 
 
 @kernel
@@ -77,10 +77,7 @@ def begin(
     for i in range(X_RATE, x.shape[0]):
         x[i] = 0.0
     forget(covariance, 0, covariance.shape[0], 0.0)
-    across = variance + _SEARCH_VARIANCE
-    for i in range(3):
-        for j in range(3):
-            covariance[THETA + i, THETA + j] = across * ((1.0 if i == j else 0.0) - sun_n[i] * sun_n[j])
+    _widen_across(covariance, sun_n, variance + _SEARCH_VARIANCE)
     begin_rate(p.motion, model, (0.0, 0.0, 0.0), p.motion.start_rate, wheels_b, x, covariance)
     cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
@@ -117,9 +114,7 @@ def look_for_roll(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3) -> No
         x[X_GAIN + cells + i] = 0.0
     forget(covariance, EARTH, 1, p.earth.scale)
     forget(covariance, GAIN + cells, cells, 1.0)
-    for i in range(3):
-        for j in range(3):
-            covariance[THETA + i, THETA + j] += _HEADING_VARIANCE * ((1.0 if i == j else 0.0) - sun_n[i] * sun_n[j])
+    _widen_across(covariance, sun_n, _HEADING_VARIANCE)
     _widen(covariance, sun_n, _ROLL_VARIANCE)
     for k in range(1, HYPOTHESES):
         turn = rotation_vector_to_dcm(scale(2.0 * math.pi * k / HYPOTHESES, sun_n))
@@ -149,10 +144,19 @@ def _widen(covariance, axis_n: Vec3, variance: float) -> None:
 
 
 @kernel
-def loosen_roll(covariance, sun_n: Vec3, since: float, dt: float) -> None:
-    """Keeps the variance about the Sun line [rad2] above what `since` [s] the hypotheses began is credible."""
-    floor = _ROLL_VARIANCE * math.exp(-2.0 * since / _SETTLING)
-    _widen(covariance, sun_n, max(_ROLL_NOISE * dt, floor - quadratic(covariance, THETA, sun_n)))
+def _widen_across(covariance, axis_n: Vec3, variance: float) -> None:
+    for i in range(3):
+        for j in range(3):
+            covariance[THETA + i, THETA + j] += variance * ((1.0 if i == j else 0.0) - axis_n[i] * axis_n[j])
+
+
+@kernel
+def loosen(covariance, sun_n: Vec3, since: float, dt: float) -> None:
+    """Keeps the variance about the Sun line above what is credible `since` [s] the hypotheses began; clouds' noise."""
+    left = math.exp(-2.0 * since / _SETTLING)
+    about = quadratic(covariance, THETA, sun_n)
+    _widen(covariance, sun_n, max(_ROLL_NOISE * dt, _ROLL_VARIANCE * left - about))
+    _widen_across(covariance, sun_n, _HEADING_NOISE * dt)
 
 
 @kernel

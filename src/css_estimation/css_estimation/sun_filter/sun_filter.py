@@ -44,7 +44,7 @@ from css_estimation.sun.sun_tracking import elapsed
 from css_estimation.sun_filter import options
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
-from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen_roll, weigh
+from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, weigh
 from css_estimation.sun_filter.memory import (
     DEAD,
     DIRECTIONS,
@@ -345,7 +345,8 @@ def _track(
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
-    if use and heading_sigma(best_covariance, sun_n) < _CONVERGED:
+    # an orbit model tells a penumbra better, and while turns are looked for outputs are not as expected
+    if use and not earth_known and heading_sigma(best_covariance, sun_n) < _CONVERGED:
         faded = fading(p, best_x, best_covariance, sun_n, cycle.flux, voltages, faded, dt)
         use = faded == 0.0
     if use:
@@ -355,7 +356,7 @@ def _track(
                 continue
             x, covariance = memory.estimates[k], memory.covariances[k]
             if earth_known:
-                loosen_roll(covariance, sun_n, before.since, dt)
+                loosen(covariance, sun_n, before.since, dt)
             read = read_cells(
                 p,
                 voltages,
