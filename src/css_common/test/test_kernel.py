@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numba import types, typeof
+from numba import typeof, types
 from numba.core.errors import NumbaError
 
 from css_common.kernel import kernel, outer_kernel, study_kernel
