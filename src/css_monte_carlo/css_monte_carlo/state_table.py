@@ -4,7 +4,8 @@
 Numba's own lists do the same, and take longer to compile for a new kind of state than the loop around them.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 from llvmlite import ir
@@ -39,9 +40,7 @@ def _keep(rows, c: int, like: Any, state: Any) -> None:
 
 
 @intrinsic
-def state_of(typing_context, rows, c, like):
-    """The state of a case, `like` that one in type."""
-
+def _state_of(typing_context, rows, c, like):
     def code(context, builder, signature, values):
         return context.unpack_value(builder, signature.return_type, _place(context, builder, signature, values))
 
@@ -49,8 +48,7 @@ def state_of(typing_context, rows, c, like):
 
 
 @intrinsic
-def keep_state(typing_context, rows, c, like, state):
-    """Writes the state of a case into its row."""
+def _keep_state(typing_context, rows, c, like, state):
     if state != like:
         raise errors.TypingError(f"a state of type {like} has become {state}")
 
@@ -59,6 +57,13 @@ def keep_state(typing_context, rows, c, like, state):
         return context.get_dummy_value()
 
     return types.void(rows, types.intp, like, state), code
+
+
+state_of: Callable[[np.ndarray, int, Any], Any] = cast(Any, _state_of)
+"""The state of case `c`, in a kernel: `state_of(rows, c, like)`, where `like` is a state of the same types."""
+
+keep_state: Callable[[np.ndarray, int, Any, Any], None] = cast(Any, _keep_state)
+"""Writes the state of case `c` into its row, in a kernel: `keep_state(rows, c, like, state)`."""
 
 
 def _place(context: Any, builder: Any, signature: Any, values: Any) -> Any:
