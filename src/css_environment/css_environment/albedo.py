@@ -52,7 +52,7 @@ _FREE, _POSITIVE, _NEGATIVE = 0, 2 * PATCHES, 4 * PATCHES
 _TERMS = 6 * PATCHES
 
 # A cone narrower than the patches would need finer ones; its edge is not softened below this sine.
-_NARROWEST_SIN = 0.05
+NARROWEST_SIN = 0.05
 
 
 class Screen(NamedTuple):
@@ -119,7 +119,7 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
     sin_half_view = math.sqrt(max(0.0, 1.0 - cos_half_view * cos_half_view))
     # Cells that look away from nadir by more than half their view and half the Earth's see nothing of it.
     reach_cos = cos_half_view * light[DISC + DISC_COS] - sin_half_view * light[DISC + DISC_SIN]
-    edge_sin = max(_NARROWEST_SIN, sin_half_view)
+    edge_sin = max(NARROWEST_SIN, sin_half_view)
 
     # What passes the screen to cells on either side. All loops over patches stand in this one function: apart, each
     # call would count references to its arrays, which takes longer than the arithmetic.
