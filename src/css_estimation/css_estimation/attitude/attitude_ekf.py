@@ -8,17 +8,28 @@ turns with the mean of the gyro's readings at both ends, which is exact for a ra
 
 It begins, and begins anew, from the Sun and the field together (`attitude_start`): when it has never had an attitude,
 when a step was too long to be bridged, when its uncertainty has grown beyond use, and when the field or the Sun has
-contradicted it for too long.
+contradicted it for too long. Until all rolls about the field have been weighed (`roll_search`) no attitude is taken for
+sure: a wide one is not narrowed by the cells, in which it might settle wrongly, and one that is not where the weight is
+gives way.
 
 An attitude filter is a module with `parameters(values)`, `initial_state(p)`, `initial_memory(p)` and the kernel `step`
 below. What `parameters` returns is a NamedTuple that the module itself defines: by its type a study finds the module.
 """
 
-from css_common.attitude import dcm_to_mrp, mrp_add, rotation_vector_to_dcm, rotation_vector_to_mrp
+import math
+
+from css_common.attitude import (
+    dcm_to_mrp,
+    mrp_add,
+    mrp_subtract,
+    mrp_to_rotation_vector,
+    rotation_vector_to_dcm,
+    rotation_vector_to_mrp,
+)
 from css_common.kernel import kernel
 from css_common.schema import Values
-from css_common.vectors import Vec3, add, scale, subtract
-from css_estimation.attitude import attitude_options, attitude_solution
+from css_common.vectors import Vec3, add, dot, norm, scale, subtract
+from css_estimation.attitude import attitude_options, attitude_solution, roll_search, slow_errors
 from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters
 from css_estimation.attitude.attitude_solution import (
     MODE_LOST,
@@ -37,25 +48,36 @@ from css_estimation.attitude.attitude_solution import (
     AttitudeState,
     with_alignment,
     with_attitude,
+    with_search,
 )
-from css_estimation.attitude.attitude_update import Tally, find_start, measure
+from css_estimation.attitude.attitude_update import Tally, believed_fields, find_start, measure, telling_cells
 from css_estimation.attitude.field_direction import plausible_field
 from css_estimation.attitude.flight_references import References
 from css_estimation.sun import cell_calibration
 from css_estimation.sun.error_covariance import (
     ATTITUDE,
     BIAS,
-    CALIBRATION,
+    FURTHER,
     attitude_block,
     bound,
     propagate,
     set_block,
 )
-from css_estimation.symmetric import isotropic, trace
+from css_estimation.symmetric import Symmetric, add_outer, inverse_form, isotropic, product, trace
 
 # Trace of the attitude covariance [rad^2] beyond which a fresh start is better: 33 deg for each axis.
 _USELESS = 1.0
 _LONGEST_SPAN = 1e9
+# Of a contradiction as much is forgotten in a second of agreement. A false attitude agrees by the way, but seldom.
+_FORGIVEN = 0.25
+# After so long without field or Sun the search is given up, and a wide attitude is narrowed by what there is [s].
+_LONGEST_IDLE = 30.0
+# After so long a contradiction all rolls are weighed anew [s].
+_DOUBTED = 10.0
+# Attitude of a search: its error across the field [rad], before the filter takes the field itself.
+_LAID = 0.03
+# Normalised squared angle, 99.9 % of chi-square of three, beyond which an attitude is not the one that was found.
+_OTHER = 16.27
 
 
 class AttitudeEkf(AttitudeParameters):
@@ -106,7 +128,7 @@ def step(
     """
     dt = min(dt, _LONGEST_SPAN) if dt > 0.0 else 0.0
     gyro_ok = _gyro_usable(p, gyro_b, gyro_valid)
-    if state.started:
+    if state.started or state.search.begun:
         state = _predict(p, state, memory, dt, gyro_b, gyro_ok)
     field_ok = field_valid and plausible_field(field_b) and plausible_field(references.field_n)
     tally = Tally(0.0, 0, False, 0, 0)
@@ -116,19 +138,106 @@ def step(
         begun, mask = find_start(p, memory, voltages, field_b, field_ok, references)
         if begun.found:
             started_now = True
-            set_block(memory.covariance, ATTITUDE, begun.covariance)
-            bias_b = state.bias_b
-            if distrusted:
-                bias_b = (0.0, 0.0, 0.0)
-                set_block(memory.covariance, BIAS, isotropic(p.bias_variance))
-            state = with_alignment(with_attitude(state, dcm_to_mrp(begun.dcm_bn), bias_b), True, 0.0)
+            state = _begun(p, state, memory, dcm_to_mrp(begun.dcm_bn), begun.covariance, distrusted)
+            state = with_search(state, False, roll_search.no_search())
+            tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
+    if not state.confirmed and field_ok and references.sunlit:
+        state, moved, mask = _search(p, state, memory, dt, voltages, field_b, references, light)
+        if moved:
+            started_now = True
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
     if state.aligned and not started_now:
-        state, tally = measure(p, state, memory, voltages, field_b, field_ok, references, light)
-        contradicted = state.contradicted + dt if tally.refused else state.contradicted
-        state = with_alignment(state, True, 0.0 if tally.taken > 0 and not tally.refused else contradicted)
+        narrow = state.confirmed or trace(attitude_block(memory.covariance)) < p.gated_below
+        sun_too = narrow or not state.search.begun or state.search.idle > _LONGEST_IDLE
+        state, tally = measure(p, state, memory, voltages, field_b, field_ok, sun_too, references, light)
+        state = _judged(state, tally, dt)
     bound(memory.covariance, memory.largest)
     return _finish(state, gyro_b, gyro_ok, dt, started_now, tally)
+
+
+@kernel
+def _begun(
+    p: AttitudeParameters,
+    state: AttitudeState,
+    memory: AttitudeMemory,
+    sigma_bn: Vec3,
+    covariance: Symmetric,
+    anew: bool,
+) -> AttitudeState:
+    """State and memory with a new attitude; `anew`: what was learnt with the old one is wrong too."""
+    set_block(memory.covariance, ATTITUDE, covariance)
+    bias_b = state.bias_b
+    if anew:
+        bias_b = (0.0, 0.0, 0.0)
+        set_block(memory.covariance, BIAS, isotropic(p.bias_variance))
+        slow_errors.forget(p.slow, memory.covariance, memory.slow)
+    return with_alignment(with_attitude(state, sigma_bn, bias_b), True, 0.0)
+
+
+@kernel
+def _search(
+    p: AttitudeParameters,
+    state: AttitudeState,
+    memory: AttitudeMemory,
+    dt: float,
+    voltages,
+    field_b: Vec3,
+    references: References,
+    light,
+) -> tuple[AttitudeState, bool, int]:
+    """State after another look at all rolls about the field, whether the attitude was moved, and the cells that told."""
+    believed_n, unbiased_b = believed_fields(memory, field_b, references)
+    search = state.search
+    if not search.begun:
+        variance = math.inf
+        if state.aligned and state.contradicted == 0.0:
+            along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
+            variance = dot(along_b, product(attitude_block(memory.covariance), along_b)) + roll_search.LEAST_VARIANCE
+        search = roll_search.begin(memory.weights, state.sigma_bn, variance)
+    mask = telling_cells(p, memory, voltages, references)
+    believed = References(references.sun_n, references.intensity, references.sunlit, believed_n)
+    bright = slow_errors.brightness(memory.slow) if p.compensates_albedo else 0.0
+    search = roll_search.weigh(
+        p.cells,
+        memory.calibration,
+        search,
+        memory.weights,
+        dt,
+        voltages,
+        mask,
+        unbiased_b,
+        believed,
+        light,
+        bright,
+        memory.albedo_work,
+        memory.albedo,
+    )
+    verdict = roll_search.verdict(search, memory.weights, unbiased_b)
+    if not verdict.found:
+        return with_search(state, False, search), False, 0
+    along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
+    found = add_outer(isotropic(_LAID * _LAID), verdict.variance, along_b)
+    narrow = trace(attitude_block(memory.covariance)) < p.gated_below
+    off = inverse_form(found, mrp_to_rotation_vector(mrp_subtract(verdict.sigma_bn, state.sigma_bn)))
+    elsewhere = not state.aligned or off > _OTHER
+    if elsewhere or not narrow:
+        state = _begun(p, state, memory, verdict.sigma_bn, found, state.aligned and narrow)
+        return with_search(state, True, roll_search.no_search()), True, mask
+    return with_search(state, True, roll_search.no_search()), False, 0
+
+
+@kernel
+def _judged(state: AttitudeState, tally: Tally, dt: float) -> AttitudeState:
+    """State with the time of contradiction after the measurements of a cycle."""
+    contradicted = state.contradicted
+    if tally.refused:
+        contradicted += dt
+    elif tally.taken > 0:
+        contradicted = max(0.0, contradicted - _FORGIVEN * dt)
+    state = with_alignment(state, True, contradicted)
+    if state.confirmed and contradicted > _DOUBTED:
+        return with_search(state, False, roll_search.no_search())
+    return state
 
 
 @kernel
@@ -144,9 +253,10 @@ def _predict(p, state: AttitudeState, memory: AttitudeMemory, dt: float, gyro_b:
     if dt > p.longest_step:
         # what turned the body meanwhile is unknown; how its bias may have walked is not
         set_block(memory.covariance, ATTITUDE, isotropic(LOST_VARIANCE))
-        for i in range(BIAS, CALIBRATION):
+        for i in range(BIAS, FURTHER):
             memory.covariance[i, i] += p.bias_noise * dt
-        return with_alignment(state, False, 0.0)
+        slow_errors.relax(p.slow, memory.covariance, memory.slow, dt)
+        return with_search(with_alignment(state, False, 0.0), False, roll_search.no_search())
     rate = state.omega_bn_b
     if gyro_ok:
         mean = scale(0.5, add(state.gyro_b, gyro_b)) if state.gyro_known else gyro_b
@@ -154,7 +264,10 @@ def _predict(p, state: AttitudeState, memory: AttitudeMemory, dt: float, gyro_b:
     turn = scale(dt, rate)
     noise = p.angle_noise if gyro_ok else p.noise_without_gyro
     propagate(memory.covariance, rotation_vector_to_dcm(turn), dt, noise, p.bias_noise, gyro_ok)
-    cell_calibration.add_drift(p.cells.calibration, memory.covariance, dt)
+    slow_errors.relax(p.slow, memory.covariance, memory.slow, dt)
+    cell_calibration.add_drift(p.cells.calibration, p.cells.calibration_at, memory.covariance, dt)
+    if state.search.begun:
+        state = with_search(state, state.confirmed, roll_search.turned(state.search, turn, dt))
     return with_attitude(state, mrp_add(state.sigma_bn, rotation_vector_to_mrp(turn)), state.bias_b)
 
 
@@ -179,7 +292,17 @@ def _finish(
     omega_bn_b = subtract(gyro_b, state.bias_b) if gyro_ok else state.omega_bn_b
     last_b = gyro_b if gyro_ok else (0.0, 0.0, 0.0)
     after = AttitudeState(
-        started, state.aligned, state.sigma_bn, state.bias_b, omega_bn_b, last_b, gyro_ok, age, state.contradicted
+        started,
+        state.aligned,
+        state.sigma_bn,
+        state.bias_b,
+        omega_bn_b,
+        last_b,
+        gyro_ok,
+        age,
+        state.contradicted,
+        state.confirmed,
+        state.search,
     )
     return after, AttitudeSolution(
         state.sigma_bn,
