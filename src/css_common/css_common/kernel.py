@@ -73,7 +73,19 @@ def kernel(function: Callable[P, R]) -> "Kernel[P, R]":
     Raises:
         TypeError: at the first call, when the function returns an array.
     """
-    dispatcher: Any = _compiled(function, cache_folder(function.__module__), _UNCOUNTED)
+    return _uncounted(function, cache_folder(function.__module__))
+
+
+def steps_kernel(function: Callable[P, R]) -> "Kernel[P, R]":
+    """The steps of a study's loop: a `kernel` that calls others by the types of its arguments, as `outer_kernel` does.
+
+    Its sources do not name what it is made from, so that, as a `kernel`, it would keep old estimators.
+    """
+    return _uncounted(function, _kernels() / study_hash(function.__module__))
+
+
+def _uncounted(function: Callable[P, R], folder: Path) -> "Kernel[P, R]":
+    dispatcher: Any = _compiled(function, folder, _UNCOUNTED)
     if numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         return dispatcher
     compile_types = dispatcher.compile

@@ -131,10 +131,11 @@ def test_edit_two_imports_away_counts(project):
     assert project.run()["result"] == 40.0
 
 
-def test_a_loop_is_made_from_every_kernel_that_it_may_be_handed(project):
+@pytest.mark.parametrize("decorator", ["outer_kernel", "steps_kernel"])
+def test_a_loop_is_made_from_every_kernel_that_it_may_be_handed(project, decorator):
     # nothing that is imported by the loop: called by the type of an argument, as an estimator is
     (project.root / "css_sim" / "outer.py").write_text(
-        "from css_common.kernel import outer_kernel\n@outer_kernel\ndef outer(x):\n    return 20.0 * x\n"
+        f"from css_common.kernel import {decorator}\n@{decorator}\ndef outer(x):\n    return 20.0 * x\n"
     )
     before = project.run()
     assert project.run() == before | {"hits": 1}

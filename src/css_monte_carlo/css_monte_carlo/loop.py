@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.attitude import mrp_to_dcm
-from css_common.kernel import kernel, outer_kernel
+from css_common.kernel import kernel, outer_kernel, steps_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply
 from css_environment.albedo_vector import PATCHES, point_source
@@ -140,9 +140,9 @@ def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
     return CaseState(rotation, heading, attitude, state.memory, control, field_b, field_step)
 
 
-@kernel
+@steps_kernel
 def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace):
-    """The steps of a block: a kernel, so that no array is counted as a reference; returns the state but the memory."""
+    """The steps of a block: no outer kernel, so that no array is counted as a reference; returns the state but the memory."""
     torque, dipole, speeds, momentum = actuators.torque, actuators.dipole, actuators.speeds, actuators.momentum
     # nodes divide the time between stamps, the plant multiplies its period: the last bit may differ
     since_s = v.period_ns / 1e9

@@ -55,7 +55,7 @@ class AttitudeMemory(NamedTuple):
     largest: np.ndarray  # (n,) bounds of the variances
     work: np.ndarray  # (3, n)
     calibration: np.ndarray  # (N, 3)
-    slow: np.ndarray  # (7,) of `slow_errors`
+    slow: np.ndarray  # (10,) of `slow_errors`
     weights: np.ndarray  # (36,) of `roll_search`
     outputs: np.ndarray  # (N,) room for outputs relative to the Sun at normal incidence
     albedo: np.ndarray  # (N,) room for predicted light of the Earth

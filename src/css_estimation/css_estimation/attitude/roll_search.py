@@ -34,8 +34,8 @@ _SURE, _LEAST_SEEN, _LARGEST_MISFIT = 0.999, 8.0, 3.0
 _MEMORY = 30.0
 # An output that fits no hypothesis (a failed cell) must not decide; nor do outputs count in full whose errors last.
 _LARGEST_SQUARE, _TEMPER = 16.0, 0.25
-# The hypotheses' own error: half a step of roll in uniform distribution, and of the field's direction [rad].
-_WITHIN, _ACROSS = _STEP / math.sqrt(12.0), 0.03
+# The hypotheses' own errors: half a step of roll, and of the field's direction [rad].
+_WITHIN, _ACROSS = 0.5 * _STEP, 0.03
 LEAST_VARIANCE = _WITHIN * _WITHIN
 """Variance [rad^2] of a roll that a hypothesis stands for."""
 

@@ -7,9 +7,10 @@ body that turns tells them apart: a bias turns with the body, the field's error 
 away from the Sun measure the brightness of the Earth alone.
 
 * The magnetometer's bias, in b, walks.
-* The error of the field model, in n, is a Gauss-Markov process of first order. What a model that ends at a low degree
-  leaves out is known by its size (`omitted_field`), and changes over a quarter of the wavelength of the first harmonic
-  that is left out.
+* The error of the field model, in n, is smooth along the orbit: a Gauss-Markov process of second order, critically
+  damped, with the correlation (1 + t/T) exp(-t/T). What a model that ends at a low degree leaves out is known by its
+  size (`omitted_field`), and T by the curvature of the first Legendre polynomial that is left out: P_n(cos theta) =
+  1 - n (n + 1) theta^2 / 4 + ..., with theta = v t / R over ground.
 * The Earth is by a factor brighter than the model, another one over land, sea and clouds: Gauss-Markov about one.
 """
 
@@ -26,9 +27,9 @@ from css_common.vectors import Vec3
 from css_environment.constants import EARTH_RADIUS
 from css_environment.magnetic_field import HIGHEST_DEGREE, omitted_field
 from css_estimation.attitude.flight_references import FIELD_DEGREE
-from css_estimation.sun.error_covariance import FURTHER, fade, set_single
+from css_estimation.sun.error_covariance import FURTHER, fade, mix, set_single
 
-MAGNETOMETER, FIELD, BRIGHTNESS, END = FURTHER, FURTHER + 3, FURTHER + 6, FURTHER + 7
+MAGNETOMETER, FIELD, FIELD_RATE, BRIGHTNESS, END = (FURTHER + k for k in (0, 3, 6, 9, 10))
 """Where each kind of slow error begins, and the index after the last."""
 
 ERROR_MODEL = choice(
@@ -78,19 +79,25 @@ class SlowErrors(NamedTuple):
 
 
 def _field_time(degree: int) -> float:
-    """How long what a field model leaves out lasts [s]: a quarter wavelength over ground."""
+    """T of what a field model leaves out [s]."""
     first = min(degree + 1, HIGHEST_DEGREE)
-    return 0.5 * math.pi * EARTH_RADIUS / first / _SPEED
+    return math.sqrt(2.0 / (first * (first + 1))) * EARTH_RADIUS / _SPEED
 
 
 def new_slow() -> np.ndarray:
-    """The slow quantities (7,) before anything is measured: bias [T], field error [T], brightness."""
-    return np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    """The slow quantities (10,) before anything is measured: bias [T], field error [T], its rate [T/s], brightness."""
+    slow = np.zeros(END - FURTHER)
+    slow[BRIGHTNESS - FURTHER] = 1.0
+    return slow
 
 
 @kernel
 def _variance(p: SlowErrors, i: int) -> float:
-    return p.bias_variance if i < FIELD else p.field_variance if i < BRIGHTNESS else p.brightness_variance
+    if i < FIELD:
+        return p.bias_variance
+    if i < FIELD_RATE:
+        return p.field_variance
+    return p.field_variance * p.field_rate * p.field_rate if i < BRIGHTNESS else p.brightness_variance
 
 
 @kernel
@@ -107,14 +114,18 @@ def relax(p: SlowErrors, covariance, slow, dt: float) -> None:
     """Quantities and covariance after `dt` [s]."""
     if not p.lasting:
         return
-    for i in range(MAGNETOMETER, END):
-        if i < FIELD:
-            covariance[i, i] += p.bias_noise * dt
-        else:
-            factor = math.exp(-dt * (p.field_rate if i < BRIGHTNESS else p.brightness_rate))
-            mean = 0.0 if i < BRIGHTNESS else 1.0
-            slow[i - FURTHER] = mean + factor * (slow[i - FURTHER] - mean)
-            fade(covariance, i, factor, (1.0 - factor * factor) * _variance(p, i))
+    for i in range(MAGNETOMETER, FIELD):
+        covariance[i, i] += p.bias_noise * dt
+    decay, turn = math.exp(-dt * p.field_rate), dt * p.field_rate
+    forward = (decay * (1.0 + turn), decay * dt, -decay * turn * p.field_rate, decay * (1.0 - turn))
+    for i in range(FIELD, FIELD_RATE):
+        k = i - FURTHER
+        error, rate = slow[k], slow[k + 3]
+        slow[k], slow[k + 3] = forward[0] * error + forward[1] * rate, forward[2] * error + forward[3] * rate
+        mix(covariance, i, i + 3, forward, p.field_variance, p.field_variance * p.field_rate * p.field_rate)
+    factor = math.exp(-dt * p.brightness_rate)
+    slow[BRIGHTNESS - FURTHER] = 1.0 + factor * (slow[BRIGHTNESS - FURTHER] - 1.0)
+    fade(covariance, BRIGHTNESS, factor, (1.0 - factor * factor) * p.brightness_variance)
 
 
 @kernel
@@ -141,13 +152,16 @@ def field_error(slow) -> Vec3:
 @kernel
 def brightness(slow) -> float:
     """The Earth's, relative to the model's."""
-    return slow[6]
+    return slow[9]
 
 
 def largest_variances(p: SlowErrors) -> list[float]:
     """Variances above which errors say no more."""
+    if not p.lasting:
+        return []
     bias, field = 4.0 * p.bias_variance + 1e-24, 4.0 * p.field_variance + 1e-24
-    return [bias] * 3 + [field] * 3 + [4.0 * p.brightness_variance + 1e-12] if p.lasting else []
+    rate = 4.0 * p.field_variance * p.field_rate * p.field_rate + 1e-30
+    return [bias] * 3 + [field] * 3 + [rate] * 3 + [4.0 * p.brightness_variance + 1e-12]
 
 
 def first_of_cells(word: str) -> int:

@@ -225,3 +225,25 @@ def fade(covariance, i: int, factor: float, variance: float) -> None:
         covariance[i, j] *= factor
         covariance[j, i] *= factor
     covariance[i, i] += variance
+
+
+@kernel
+def mix(covariance, i: int, j: int, forward: tuple[float, float, float, float], lasting_i: float, lasting_j: float) -> None:
+    """Two errors are carried on by a 2 x 2 matrix (row by row), with the noise that keeps their variances in the end.
+
+    Args:
+        lasting_i, lasting_j: the variances P that they tend to, uncorrelated: the noise is P - F P F^T.
+    """
+    p, (a, b, c, d) = covariance, forward
+    for k in range(p.shape[0]):
+        p[i, k], p[j, k] = a * p[i, k] + b * p[j, k], c * p[i, k] + d * p[j, k]
+    for k in range(p.shape[0]):
+        p[k, i], p[k, j] = a * p[k, i] + b * p[k, j], c * p[k, i] + d * p[k, j]
+    p[i, i] += lasting_i - (a * a * lasting_i + b * b * lasting_j)
+    p[j, j] += lasting_j - (c * c * lasting_i + d * d * lasting_j)
+    noise = -(a * c * lasting_i + b * d * lasting_j)
+    p[i, j] += noise
+    # symmetric to the last bit
+    p[j, i] = p[i, j]
+    for k in range(p.shape[0]):
+        p[k, i], p[k, j] = p[i, k], p[j, k]
