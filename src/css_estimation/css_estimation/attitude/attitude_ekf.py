@@ -145,7 +145,7 @@ def step(
         state, moved, mask = _search(p, state, memory, dt, voltages, field_b, references, light)
         if moved:
             started_now = True
-            tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
+            tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN if mask != 0 else USED_FIELD)
     if state.aligned and not started_now:
         narrow = state.confirmed or trace(attitude_block(memory.covariance)) < p.gated_below
         sun_too = narrow or not state.search.begun or state.search.idle > _LONGEST_IDLE
@@ -187,13 +187,19 @@ def _search(
 ) -> tuple[AttitudeState, bool, int]:
     """State after another look at all rolls about the field, whether the attitude was moved, and the cells that told."""
     believed_n, unbiased_b = believed_fields(memory, field_b, references)
+    along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
+    attitude = attitude_block(memory.covariance)
+    narrow, doubted = trace(attitude) < p.gated_below, state.contradicted > _DOUBTED
     search = state.search
     if not search.begun:
-        variance = math.inf
-        if state.aligned and state.contradicted == 0.0:
-            along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
-            variance = dot(along_b, product(attitude_block(memory.covariance), along_b)) + roll_search.LEAST_VARIANCE
-        search = roll_search.begin(memory.weights, state.sigma_bn, variance)
+        known = state.aligned and not doubted
+        variance = dot(along_b, product(attitude, along_b)) + roll_search.LEAST_VARIANCE if known else math.inf
+        laid_bn = roll_search.laid_on(state.sigma_bn, believed_n, along_b)
+        search = roll_search.begin(memory.weights, laid_bn, variance)
+        if known and not narrow:
+            # far off, a linear update by the field would take the axis that it leaves open for another one
+            state = _begun(p, state, memory, laid_bn, add_outer(isotropic(_LAID * _LAID), variance, along_b), False)
+            return with_search(state, False, search), True, 0
     mask = telling_cells(p, memory, voltages, references)
     believed = References(references.sun_n, references.intensity, references.sunlit, believed_n)
     bright = slow_errors.brightness(memory.slow) if p.compensates_albedo else 0.0
@@ -215,15 +221,12 @@ def _search(
     verdict = roll_search.verdict(search, memory.weights, unbiased_b)
     if not verdict.found:
         return with_search(state, False, search), False, 0
-    along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
     found = add_outer(isotropic(_LAID * _LAID), verdict.variance, along_b)
-    narrow = trace(attitude_block(memory.covariance)) < p.gated_below
     off = inverse_form(found, mrp_to_rotation_vector(mrp_subtract(verdict.sigma_bn, state.sigma_bn)))
-    elsewhere = not state.aligned or off > _OTHER
-    if elsewhere or not narrow:
+    moved = not (state.aligned and narrow) or doubted or off > _OTHER
+    if moved:
         state = _begun(p, state, memory, verdict.sigma_bn, found, state.aligned and narrow)
-        return with_search(state, True, roll_search.no_search()), True, mask
-    return with_search(state, True, roll_search.no_search()), False, 0
+    return with_search(state, True, roll_search.no_search()), moved, mask
 
 
 @kernel

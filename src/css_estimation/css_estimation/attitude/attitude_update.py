@@ -302,7 +302,7 @@ def _corrected(p, state: AttitudeState, memory: AttitudeMemory) -> AttitudeState
 def telling_cells(p: AttitudeParameters, memory: AttitudeMemory, voltages, references: References) -> int:
     """Cells by which an attitude can be told from others: all, or of the vector model those that make a vector."""
     if p.by_voltage:
-        return -1
+        return (1 << voltages.shape[0]) - 1
     no_earth_on_cells(memory.albedo, memory.albedo_slopes)
     mask, top = _lit_outputs(p, memory, voltages, references.intensity)
     if mask == 0 or lit_sun(p.cells.layout.cells, memory.outputs, mask, top).rank < 3:

@@ -94,6 +94,19 @@ def turned(search: RollSearch, turn: Vec3, dt: float) -> RollSearch:
 
 
 @kernel
+def laid_on(sigma_bn: Vec3, field_n: Vec3, along_b: Vec3) -> Vec3:
+    """The attitude turned the shortest way to where the field lies along the unit vector `along_b`."""
+    predicted_b = multiply(mrp_to_dcm(sigma_bn), field_n)
+    axis = cross(along_b, predicted_b)
+    length = norm(axis)
+    if length > 1e-12 * norm(predicted_b):
+        axis = scale(1.0 / length, axis)
+    else:
+        axis, _ = axes_across(along_b)
+    return mrp_add(sigma_bn, rotation_vector_to_mrp(scale(angle_between(along_b, predicted_b), axis)))
+
+
+@kernel
 def weigh(
     cells: CellModel,
     calibration,
@@ -123,7 +136,7 @@ def weigh(
         room: (N,) the same.
     """
     along_b = scale(1.0 / norm(field_b), field_b)
-    sigma_bn = _laid_on(search.sigma_bn, references.field_n, along_b)
+    sigma_bn = laid_on(search.sigma_bn, references.field_n, along_b)
     dcm_bn = mrp_to_dcm(sigma_bn)
     fading = math.exp(-dt / _MEMORY)
     seen = fading * search.seen
@@ -172,19 +185,6 @@ def verdict(search: RollSearch, weights, field_b: Vec3) -> Verdict:
 def _roll(j: int) -> float:
     """Roll of a hypothesis [rad], -pi to pi; the first has none."""
     return _STEP * ((j + HYPOTHESES // 2) % HYPOTHESES - HYPOTHESES // 2)
-
-
-@kernel
-def _laid_on(sigma_bn: Vec3, field_n: Vec3, along_b: Vec3) -> Vec3:
-    """The attitude turned the shortest way to where the field is measured along `along_b`."""
-    predicted_b = multiply(mrp_to_dcm(sigma_bn), field_n)
-    axis = cross(along_b, predicted_b)
-    length = norm(axis)
-    if length > 1e-12 * norm(predicted_b):
-        axis = scale(1.0 / length, axis)
-    else:
-        axis, _ = axes_across(along_b)
-    return mrp_add(sigma_bn, rotation_vector_to_mrp(scale(angle_between(along_b, predicted_b), axis)))
 
 
 @kernel
