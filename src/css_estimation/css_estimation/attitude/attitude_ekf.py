@@ -141,7 +141,7 @@ def step(
             state = _begun(p, state, memory, dcm_to_mrp(begun.dcm_bn), begun.covariance, distrusted)
             state = with_search(state, False, roll_search.no_search())
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
-    if not state.confirmed and field_ok and references.sunlit:
+    if not state.confirmed and field_ok:
         state, moved, mask = _search(p, state, memory, dt, voltages, field_b, references, light)
         if moved:
             started_now = True
@@ -200,6 +200,8 @@ def _search(
             # far off, a linear update by the field would take the axis that it leaves open for another one
             state = _begun(p, state, memory, laid_bn, add_outer(isotropic(_LAID * _LAID), variance, along_b), False)
             return with_search(state, False, search), True, 0
+    if not references.sunlit:
+        return with_search(state, False, search), False, 0
     mask = telling_cells(p, memory, voltages, references)
     believed = References(references.sun_n, references.intensity, references.sunlit, believed_n)
     bright = slow_errors.brightness(memory.slow) if p.compensates_albedo else 0.0
