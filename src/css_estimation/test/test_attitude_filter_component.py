@@ -118,3 +118,14 @@ def test_light_of_the_earth_is_predicted_unless_it_is_not_wanted(references):
     blind = FlightReferences(values_of(albedo__compensate=False))
     blind.at(100.0)
     assert not blind.light.any()
+
+
+def test_a_vector_cannot_calibrate_cells():
+    assert any("calibration.mode" in line for line in AttitudeFilter.conflicts(
+        values_of(sun_model="vector", calibration__mode="estimate")
+    ))  # fmt: skip
+    assert not list(AttitudeFilter.conflicts(values_of(calibration__mode="estimate")))
+
+
+def test_no_field_message_is_no_measurement():
+    assert field_reading(None) == ((0.0, 0.0, 0.0), False)
