@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the light of the Earth on each cell changes as the body turns: derivatives of `albedo.albedo_output`.
 
-Turned by a small rotation vector dtheta (in b), the body sees a patch in direction d_b at d_b - dtheta x d_b. Of the
-light L_j that a cell with normal n takes from patch j, with the screen's axis a, only the cosines n.d and a.d change, so
-that
+Turned by a small rotation vector dtheta (in b), the body sees a patch in direction d at d - dtheta x d. Of the light
+that a cell with normal n takes from patch j, only the cosines n.d and a.d change, with the screen's axis a, so that
 
     d output / d dtheta = n x sum_j (dL_j / d(n.d_j)) d_j + a x sum_j (dL_j / d(a.d_j)) d_j,
 

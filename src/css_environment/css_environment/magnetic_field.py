@@ -69,9 +69,7 @@ def omitted_field(degree: int, height: float = _LOW_ORBIT) -> float:
 
     ratio = _REFERENCE_RADIUS / (_REFERENCE_RADIUS + height)
     g, h = (coefficients.iloc[-2] for coefficients in ppigrf.read_shc(ppigrf.shc_fn))
-    power = sum(
-        (n + 1) * ratio ** (2 * n + 4) * (g[n, m] ** 2 + h[n, m] ** 2) for n, m in g.index if n > degree
-    )
+    power = sum((n + 1) * ratio ** (2 * n + 4) * (g[n, m] ** 2 + h[n, m] ** 2) for n, m in g.index if n > degree)
     return 1e-9 * math.sqrt(power / 3.0)
 
 

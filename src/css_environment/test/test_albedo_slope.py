@@ -24,9 +24,7 @@ def light():
     r_n = (EARTH_RADIUS + 400e3) * np.array([np.cos(0.5), 0.0, np.sin(0.5)])
     sun_n = (float(np.cos(1.4)), 0.0, float(np.sin(1.4)))
     identity = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    albedo_sources(
-        new_earth_view(), tuple(r_n.tolist()), sun_n, 1.0, identity, zonal_reflectivity(1).mean, light
-    )
+    albedo_sources(new_earth_view(), tuple(r_n.tolist()), sun_n, 1.0, identity, zonal_reflectivity(1).mean, light)
     return light
 
 

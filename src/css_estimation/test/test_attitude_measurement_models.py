@@ -22,6 +22,7 @@ from css_estimation.sun.cell_calibration import SCALE, TILT_1, TILT_2, nominal
 FACES = [1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0]
 TABLE = CELLS + attitude_options.PARAMETERS + flight_references.PARAMETERS
 STEP = 1e-6
+NONE = np.zeros(3)
 NEVER = -2.0
 """Cosine of the Sun below which a cell looks away: none does."""
 
@@ -87,7 +88,7 @@ def test_a_field_that_errs_lastingly(rng):
     dcm_bn = rotation_vector_to_dcm(tuple(rng.normal(size=3).tolist()))
     field_n, bias_b = (tuple((k * rng.normal(size=3)).tolist()) for k in (3e-5, 3e-6))
 
-    def predicted(turn=(0.0, 0.0, 0.0), off_n=np.zeros(3), off_b=np.zeros(3)):
+    def predicted(turn=(0.0, 0.0, 0.0), off_n=NONE, off_b=NONE):
         turned = np.array(rotation_vector_to_dcm(tuple(turn))) @ np.array(dcm_bn)
         return tuple((turned @ (np.array(field_n) + off_n) + bias_b + off_b).tolist())
 
@@ -140,13 +141,11 @@ def test_the_earth_moves_a_sun_vector(rng):
     outputs, light = np.abs(rng.normal(size=5)) + 0.2, 0.1 * np.abs(rng.normal(size=5))
     slopes, predicted_b = 0.1 * rng.normal(size=(5, 3)), direction(rng)
 
-    def measured(turn=np.zeros(3), off=0.0):
+    def measured(turn=NONE, off=0.0):
         """Outputs relative to the Sun once the Earth is brighter, and the body turned."""
         seen = outputs + ((brightness + off) * (light + slopes @ turn) - brightness * light) / intensity
         sun = lit_sun(cells, seen, mask, int(np.argmax(outputs)))
-        return sun_vector_measurement(
-            sun, cells, mask, predicted_b, intensity, earth(light, slopes, brightness), 1.0
-        )
+        return sun_vector_measurement(sun, cells, mask, predicted_b, intensity, earth(light, slopes, brightness), 1.0)
 
     m = measured()
     without = sun_vector_measurement(
@@ -183,7 +182,7 @@ def test_voltage_partials(rng, used):
     calibration = nominal(3)
     calibration[1] = 1.1, 0.02, -0.03
 
-    def measured(true_b=sun_b, table=calibration, turn=np.zeros(3), bright=brightness):
+    def measured(true_b=sun_b, table=calibration, turn=NONE, bright=brightness):
         seen = earth(light + slopes @ turn, slopes, bright)
         return -cell_measurement(p, table, 1, 0.0, True, true_b, intensity, seen, NEVER).residual
 

@@ -137,8 +137,8 @@ def test_a_failed_cell_does_not_decide(seed):
     assert not verdict.found or search.error(verdict.sigma_bn)[0] < np.radians(15.0)
 
 
-# Starts from which a filter that lets field and cells narrow any attitude settled wrongly with four diodes in a plane: up
-# to 43 deg off after 80 s, sure of 1 deg.
+# Starts from which a filter that lets field and cells narrow any attitude settled wrongly with four diodes in a plane:
+# up to 43 deg off after 80 s, sure of 1 deg.
 FALSE_STARTS = (1122, 1152, 1223, 1340, 1367, 1399, 1670, 2413)
 
 

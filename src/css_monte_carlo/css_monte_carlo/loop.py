@@ -142,7 +142,7 @@ def _fly_case(v, cases, c, state, around, marks, first_step, tallies, trace):
 
 @steps_kernel
 def _fly_steps(v, craft, sensors, actuators, cases, c, state, around, marks, first_step, voltages, tallies, trace):
-    """The steps of a block: no outer kernel, so that no array is counted as a reference; returns the state but the memory."""
+    """The steps of a block, apart so that no array is counted as a reference; returns the state but the memory."""
     torque, dipole, speeds, momentum = actuators.torque, actuators.dipole, actuators.speeds, actuators.momentum
     # nodes divide the time between stamps, the plant multiplies its period: the last bit may differ
     since_s = v.period_ns / 1e9

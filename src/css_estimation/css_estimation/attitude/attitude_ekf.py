@@ -185,7 +185,7 @@ def _search(
     references: References,
     light,
 ) -> tuple[AttitudeState, bool, int]:
-    """State after another look at all rolls about the field, whether the attitude was moved, and the cells that told."""
+    """State after another look at all rolls about the field, whether the attitude moved, and the cells that told."""
     believed_n, unbiased_b = believed_fields(memory, field_b, references)
     along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
     attitude = attitude_block(memory.covariance)

@@ -11,9 +11,9 @@ from css_common.conversions import square_of_degrees
 from css_common.declared import builder, given, made, part, table_of
 from css_common.schema import choice, flag, real, reals
 from css_common.vectors import Vec3, vector_of
+from css_estimation.attitude import slow_errors
 from css_estimation.attitude.cell_voltages import CellModel
 from css_estimation.attitude.flight_references import COMPENSATE
-from css_estimation.attitude import slow_errors
 from css_estimation.attitude.slow_errors import SlowErrors
 from css_estimation.sun import cell_calibration
 from css_estimation.sun.error_covariance import BIAS, FURTHER

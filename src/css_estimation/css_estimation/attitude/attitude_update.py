@@ -11,6 +11,7 @@ from typing import NamedTuple
 from css_common.attitude import mrp_add, mrp_to_dcm, rotation_vector_to_mrp
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, add, dot, multiply, norm, scale, subtract
+from css_estimation.attitude import slow_errors
 from css_estimation.attitude.attitude_options import AttitudeParameters
 from css_estimation.attitude.attitude_solution import USED_FIELD, USED_SUN, AttitudeMemory, AttitudeState, with_attitude
 from css_estimation.attitude.attitude_start import Start, chosen_sun, no_start, start
@@ -25,7 +26,6 @@ from css_estimation.attitude.earth_on_cells import EarthOnCells, no_earth_on_cel
 from css_estimation.attitude.field_direction import biased_field_measurement, field_measurement
 from css_estimation.attitude.flight_references import References
 from css_estimation.attitude.lit_sun_vector import lit_sun, sun_vector_measurement
-from css_estimation.attitude import slow_errors
 from css_estimation.attitude.slow_errors import BRIGHTNESS, brightness, field_error, magnetometer_bias
 from css_estimation.sun import cell_calibration
 from css_estimation.sun.cell_calibration import SCALE
@@ -89,7 +89,9 @@ def measure(
         of_it = (BRIGHTNESS, 1) if p.slow.lasting else (0, 0)
         dcm_bn = mrp_to_dcm(state.sigma_bn)
         _predict_earth(p, memory, dcm_bn, light)
-        earth = EarthOnCells(p.compensates_albedo, memory.albedo, memory.albedo_slopes, brightness(memory.slow), of_it[0], of_it[1])
+        earth = EarthOnCells(
+            p.compensates_albedo, memory.albedo, memory.albedo_slopes, brightness(memory.slow), of_it[0], of_it[1]
+        )
         mask, top = _lit_outputs(p, memory, voltages, references.intensity)
         if mask != 0:
             sun_b = multiply(dcm_bn, references.sun_n)
@@ -106,7 +108,9 @@ def measure(
                 dcm_bn = mrp_to_dcm(state.sigma_bn)
                 _predict_earth(p, memory, dcm_bn, light)
                 sun_b, bright = multiply(dcm_bn, references.sun_n), brightness(memory.slow)
-                earth = EarthOnCells(p.compensates_albedo, memory.albedo, memory.albedo_slopes, bright, of_it[0], of_it[1])
+                earth = EarthOnCells(
+                    p.compensates_albedo, memory.albedo, memory.albedo_slopes, bright, of_it[0], of_it[1]
+                )
             offered = -1 if p.by_voltage else turned_away
             if offered != 0:
                 state, tally = _take_cells(
@@ -199,9 +203,7 @@ def _is_converged(p: AttitudeParameters, memory: AttitudeMemory) -> bool:
 @kernel
 def _predict_earth(p: AttitudeParameters, memory: AttitudeMemory, dcm_bn: Mat3, light) -> None:
     if p.compensates_albedo:
-        predict_earth_on_cells(
-            p.cells.layout, dcm_bn, light, memory.albedo_work, memory.albedo, memory.albedo_slopes
-        )
+        predict_earth_on_cells(p.cells.layout, dcm_bn, light, memory.albedo_work, memory.albedo, memory.albedo_slopes)
     else:
         no_earth_on_cells(memory.albedo, memory.albedo_slopes)
 
@@ -213,7 +215,9 @@ def _lit_outputs(p: AttitudeParameters, memory: AttitudeMemory, voltages, intens
     for i in range(voltages.shape[0]):
         v = voltages[i]
         readable = -READABLE < v < READABLE
-        outputs[i] = (v / memory.calibration[i, SCALE] - bright * memory.albedo[i]) / intensity if readable else math.nan
+        outputs[i] = (
+            (v / memory.calibration[i, SCALE] - bright * memory.albedo[i]) / intensity if readable else math.nan
+        )
     top = brightest(outputs)
     mask = 0
     if top < 0 or outputs[top] <= p.minimum_output:

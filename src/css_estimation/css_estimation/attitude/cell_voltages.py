@@ -112,10 +112,8 @@ def cell_measurement(
     if c.per_cell > 0:
         slopes = calibration_partials(intensity * seen + from_earth, brightness, e1, e2, sun_b)
         own = Block(p.calibration_at + c.per_cell * i, c.per_cell, slopes)
-    attitude = add(
-        scale(brightness, cross(normal_b, sun_b)), scale(gain * earth.brightness, row(earth.slopes, i))
-    )
-    partials = Partials(attitude, own, Block(earth.index, earth.errors, (gain * earth.light[i], 0.0, 0.0)))
+    attitude = add(scale(brightness, cross(normal_b, sun_b)), scale(gain * earth.brightness, row(earth.slopes, i)))
+    partials = Partials(attitude, own, Block(earth.at, earth.errors, (gain * earth.light[i], 0.0, 0.0)))
     expected = p.expected_too and cosine > 0.0 and sees(p.layout, i, sun_b)
     return CellMeasurement(
         earth.light[i] > 0.0 if faces_away else is_lit or expected,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Light of the Earth on each cell as the filter predicts it: by its attitude, and by how bright it has found the Earth."""
+"""Light of the Earth on each cell as the filter predicts it: by its attitude, and by how bright it finds the Earth."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ class EarthOnCells(NamedTuple):
     light: np.ndarray  # (N,) [-]
     slopes: np.ndarray  # (N, 3) [1/rad] its derivative to the attitude error
     brightness: float  # of the Earth, relative to the model's
-    index: int  # of the error of the brightness
+    at: int  # index of the error of the brightness
     errors: int  # 1: it is an error of the filter, else 0
 
 

@@ -7,7 +7,19 @@ them whatever the attitude.
 """
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, add, axes_across, cross, dot, multiply, multiply_transposed, norm, scale, subtract
+from css_common.vectors import (
+    Mat3,
+    Vec3,
+    add,
+    axes_across,
+    cross,
+    dot,
+    multiply,
+    multiply_transposed,
+    norm,
+    scale,
+    subtract,
+)
 from css_estimation.attitude.direction_measurement import DirectionMeasurement, attitude_rows, no_direction
 from css_estimation.attitude.slow_errors import FIELD, MAGNETOMETER
 from css_estimation.sun.error_covariance import Block, Partials

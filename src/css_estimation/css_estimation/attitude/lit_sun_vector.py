@@ -94,4 +94,4 @@ def _row(sun: LitSun, cells, mask: int, k: int, predicted_b: Vec3, intensity: fl
             share = dot(axis, (cells[i].nx, cells[i].ny, cells[i].nz)) / (root * intensity)
             attitude = add(attitude, scale(share * earth.brightness, row(earth.slopes, i)))
             by_brightness += share * earth.light[i]
-    return Partials(attitude, no_block(), Block(earth.index, earth.errors, (by_brightness, 0.0, 0.0)))
+    return Partials(attitude, no_block(), Block(earth.at, earth.errors, (by_brightness, 0.0, 0.0)))

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors of the models that last: bias of the magnetometer, error of the field model, brightness of the Earth.
 
-A filter that takes them for white noise averages them away with the noise, and says a tenth of a degree where it errs by
-half of one. Here they are states beside attitude and gyro bias. They are estimated, not considered (Schmidt), because a
-body that turns tells them apart: a bias turns with the body, the field's error stays with the Earth, and cells that look
-away from the Sun measure the brightness of the Earth alone.
+A filter that takes them for white noise averages them away with the noise, and says a tenth of a degree where it errs
+by half of one. Here they are states beside attitude and gyro bias. They are estimated, not considered (Schmidt), as a
+body that turns tells them apart: a bias turns with the body, the field's error stays with the Earth, and cells that
+look away from the Sun measure the brightness of the Earth alone.
 
 * The magnetometer's bias, in b, walks.
 * The error of the field model, in n, is smooth along the orbit: a Gauss-Markov process of second order, critically

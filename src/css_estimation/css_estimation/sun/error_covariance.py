@@ -228,7 +228,9 @@ def fade(covariance, i: int, factor: float, variance: float) -> None:
 
 
 @kernel
-def mix(covariance, i: int, j: int, forward: tuple[float, float, float, float], lasting_i: float, lasting_j: float) -> None:
+def mix(
+    covariance, i: int, j: int, forward: tuple[float, float, float, float], lasting_i: float, lasting_j: float
+) -> None:
     """Two errors are carried on by a 2 x 2 matrix (row by row), with the noise that keeps their variances in the end.
 
     Args:
