@@ -16,20 +16,17 @@ An attitude filter is a module with `parameters(values)`, `initial_state(p)`, `i
 below. What `parameters` returns is a NamedTuple that the module itself defines: by its type a study finds the module.
 """
 
-import math
-
 from css_common.attitude import (
     dcm_to_mrp,
     mrp_add,
-    mrp_subtract,
-    mrp_to_rotation_vector,
     rotation_vector_to_dcm,
     rotation_vector_to_mrp,
 )
 from css_common.kernel import kernel
 from css_common.schema import Values
-from css_common.vectors import Vec3, add, dot, norm, scale, subtract
+from css_common.vectors import Vec3, add, scale, subtract
 from css_estimation.attitude import attitude_options, attitude_solution, roll_search, slow_errors
+from css_estimation.attitude.attitude_confirmation import begun_at, judged, search_roll
 from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters
 from css_estimation.attitude.attitude_solution import (
     MODE_LOST,
@@ -50,7 +47,7 @@ from css_estimation.attitude.attitude_solution import (
     with_attitude,
     with_search,
 )
-from css_estimation.attitude.attitude_update import Tally, believed_fields, find_start, measure, telling_cells
+from css_estimation.attitude.attitude_update import Tally, find_start, measure
 from css_estimation.attitude.field_direction import plausible_field
 from css_estimation.attitude.flight_references import References
 from css_estimation.sun import cell_calibration
@@ -63,21 +60,13 @@ from css_estimation.sun.error_covariance import (
     propagate,
     set_block,
 )
-from css_estimation.symmetric import Symmetric, add_outer, inverse_form, isotropic, product, trace
+from css_estimation.symmetric import isotropic, trace
 
 # Trace of the attitude covariance [rad^2] beyond which a fresh start is better: 33 deg for each axis.
 _USELESS = 1.0
 _LONGEST_SPAN = 1e9
-# Of a contradiction as much is forgotten in a second of agreement. A false attitude agrees by the way, but seldom.
-_FORGIVEN = 0.25
 # After so long without field or Sun the search is given up, and a wide attitude is narrowed by what there is [s].
 _LONGEST_IDLE = 30.0
-# After so long a contradiction all rolls are weighed anew [s].
-_DOUBTED = 10.0
-# Attitude of a search: its error across the field [rad], before the filter takes the field itself.
-_LAID = 0.03
-# Normalised squared angle, 99.9 % of chi-square of three, beyond which an attitude is not the one that was found.
-_OTHER = 16.27
 
 
 class AttitudeEkf(AttitudeParameters):
@@ -138,11 +127,11 @@ def step(
         begun, mask = find_start(p, memory, voltages, field_b, field_ok, references)
         if begun.found:
             started_now = True
-            state = _begun(p, state, memory, dcm_to_mrp(begun.dcm_bn), begun.covariance, distrusted)
+            state = begun_at(p, state, memory, dcm_to_mrp(begun.dcm_bn), begun.covariance, distrusted)
             state = with_search(state, False, roll_search.no_search())
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
     if not state.confirmed and field_ok:
-        state, moved, mask = _search(p, state, memory, dt, voltages, field_b, references, light)
+        state, moved, mask = search_roll(p, state, memory, dt, voltages, field_b, references, light)
         if moved:
             started_now = True
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN if mask != 0 else USED_FIELD)
@@ -150,99 +139,9 @@ def step(
         narrow = state.confirmed or trace(attitude_block(memory.covariance)) < p.gated_below
         sun_too = narrow or not state.search.begun or state.search.idle > _LONGEST_IDLE
         state, tally = measure(p, state, memory, voltages, field_b, field_ok, sun_too, references, light)
-        state = _judged(state, tally, dt)
+        state = judged(state, tally, dt)
     bound(memory.covariance, memory.largest)
     return _finish(state, gyro_b, gyro_ok, dt, started_now, tally)
-
-
-@kernel
-def _begun(
-    p: AttitudeParameters,
-    state: AttitudeState,
-    memory: AttitudeMemory,
-    sigma_bn: Vec3,
-    covariance: Symmetric,
-    anew: bool,
-) -> AttitudeState:
-    """State and memory with a new attitude; `anew`: what was learnt with the old one is wrong too."""
-    set_block(memory.covariance, ATTITUDE, covariance)
-    bias_b = state.bias_b
-    if anew:
-        bias_b = (0.0, 0.0, 0.0)
-        set_block(memory.covariance, BIAS, isotropic(p.bias_variance))
-        slow_errors.forget(p.slow, memory.covariance, memory.slow)
-    return with_alignment(with_attitude(state, sigma_bn, bias_b), True, 0.0)
-
-
-@kernel
-def _search(
-    p: AttitudeParameters,
-    state: AttitudeState,
-    memory: AttitudeMemory,
-    dt: float,
-    voltages,
-    field_b: Vec3,
-    references: References,
-    light,
-) -> tuple[AttitudeState, bool, int]:
-    """State after another look at all rolls about the field, whether the attitude moved, and the cells that told."""
-    believed_n, unbiased_b = believed_fields(memory, field_b, references)
-    along_b = scale(1.0 / norm(unbiased_b), unbiased_b)
-    attitude = attitude_block(memory.covariance)
-    narrow, doubted = trace(attitude) < p.gated_below, state.contradicted > _DOUBTED
-    search = state.search
-    if not search.begun:
-        known = state.aligned and not doubted
-        variance = dot(along_b, product(attitude, along_b)) + roll_search.LEAST_VARIANCE if known else math.inf
-        laid_bn = roll_search.laid_on(state.sigma_bn, believed_n, along_b)
-        search = roll_search.begin(memory.weights, laid_bn, variance)
-        if known and not narrow:
-            # far off, a linear update by the field would take the axis that it leaves open for another one
-            state = _begun(p, state, memory, laid_bn, add_outer(isotropic(_LAID * _LAID), variance, along_b), False)
-            return with_search(state, False, search), True, 0
-    if not references.sunlit:
-        return with_search(state, False, search), False, 0
-    mask = telling_cells(p, memory, voltages, references)
-    believed = References(references.sun_n, references.intensity, references.sunlit, believed_n)
-    bright = slow_errors.brightness(memory.slow) if p.compensates_albedo else 0.0
-    search = roll_search.weigh(
-        p.cells,
-        memory.calibration,
-        search,
-        memory.weights,
-        dt,
-        voltages,
-        mask,
-        unbiased_b,
-        believed,
-        light,
-        bright,
-        memory.albedo_work,
-        memory.albedo,
-    )
-    verdict = roll_search.verdict(search, memory.weights, unbiased_b)
-    if not verdict.found:
-        return with_search(state, False, search), False, 0
-    found = add_outer(isotropic(_LAID * _LAID), verdict.variance, along_b)
-    off = inverse_form(found, mrp_to_rotation_vector(mrp_subtract(verdict.sigma_bn, state.sigma_bn)))
-    moved = not (state.aligned and narrow) or doubted or off > _OTHER
-    if moved:
-        state = _begun(p, state, memory, verdict.sigma_bn, found, state.aligned and narrow)
-    return with_search(state, True, roll_search.no_search()), moved, mask
-
-
-@kernel
-def _judged(state: AttitudeState, tally: Tally, dt: float) -> AttitudeState:
-    """State with the time of contradiction after the measurements of a cycle."""
-    contradicted = state.contradicted
-    if tally.refused:
-        contradicted += dt
-    elif tally.taken > 0:
-        contradicted = max(0.0, contradicted - _FORGIVEN * dt)
-    state = with_alignment(state, True, contradicted)
-    if state.confirmed and contradicted > _DOUBTED:
-        return with_search(state, False, roll_search.no_search())
-    return state
 
 
 @kernel

@@ -75,7 +75,7 @@ class AttitudeParameters(NamedTuple):
             "field_sigma_nt",
             200.0,
             "nT",
-            "error of magnetometer and field model, per axis, 1 sigma",
+            "white error of magnetometer and field model, per axis, 1 sigma",
             low=0.0,
             open_low=True,
             high=1e6,

@@ -124,8 +124,8 @@ def _worlds_text(cases: int) -> str:
     return (
         f"Mean error [deg] / NEES (3), six diodes, {cases} cases at each of six hours of the day, from the start that "
         "Sun and field give. With lasting errors, as the filter is by default, the brightness of the Earth, the bias "
-        "of the magnetometer and the error of the field model are states; the filter with white errors takes off the mean "
-        "light of the Earth and knows nothing of the rest."
+        "of the magnetometer and the error of the field model are states; the filter with white errors takes off the "
+        "light of the mean Earth and knows nothing of the rest."
     )
 
 
