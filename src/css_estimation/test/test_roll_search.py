@@ -163,6 +163,14 @@ def test_no_start_ends_in_a_false_attitude(seed, errors_are):
     assert run.nees(scene) < 25.0 and run.error_deg(scene) < 4.0
 
 
+@pytest.mark.parametrize(("errors_are", "confirmed"), [("lasting", True), ("white", False)])
+def test_where_cells_never_make_a_vector_they_tell_the_roll_all_the_same(errors_are, confirmed):
+    """But to the paper's filter, which knows vectors alone: it is left with the field."""
+    run, scene = flown(1223, sun_model="vector", error_model=errors_are)
+    assert run.state.confirmed == confirmed
+    assert run.nees(scene) < 16.27
+
+
 def test_the_field_alone_keeps_the_roll_open():
     """From a guess far off, without a Sun: what the field leaves open stays as open as it was."""
     scene = Scene(1223, normals=FOUR)

@@ -304,8 +304,8 @@ def _corrected(p, state: AttitudeState, memory: AttitudeMemory) -> AttitudeState
 
 @kernel
 def telling_cells(p: AttitudeParameters, memory: AttitudeMemory, voltages, references: References) -> int:
-    """Cells by which an attitude can be told from others: all, or of the vector model those that make a vector."""
-    if p.by_voltage:
+    """Cells by which an attitude can be told from others: all, or of the paper's vector those that make one."""
+    if p.by_voltage or p.slow.lasting:
         return (1 << voltages.shape[0]) - 1
     no_earth_on_cells(memory.albedo, memory.albedo_slopes)
     mask, top = _lit_outputs(p, memory, voltages, references.intensity)
