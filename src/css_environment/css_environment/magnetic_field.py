@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Geomagnetic main field: IGRF-14 (ppigrf), 1900 to 2030."""
 
+import math
 from datetime import UTC, datetime
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,6 +14,10 @@ FIRST_YEAR, LAST_YEAR = 1900, 2030
 
 HIGHEST_DEGREE = 13
 """Of the spherical harmonics of IGRF."""
+
+# The surface to which the coefficients belong, and a low orbit's height above it [m].
+_REFERENCE_RADIUS = 6_371_200.0
+_LOW_ORBIT = 400e3
 
 
 def field_along_orbit(
@@ -50,6 +56,21 @@ def field_along_orbit(
     # Back from the turned Earth to its orientation at elapsed time zero, then to n.
     field_e0 = np.stack((cos_a * field_x - sin_a * field_y, sin_a * field_x + cos_a * field_y, field_z), 1)
     return 1e-9 * field_e0 @ np.asarray(dcm_en)
+
+
+@lru_cache
+def omitted_field(degree: int, height: float = _LOW_ORBIT) -> float:
+    """What a model leaves out that ends at `degree`: root mean square of each component over the sphere [T].
+
+    By the spectrum of Lowes 1966, sum over n of (n + 1) (a / r)^(2 n + 4) sum over m of (g_nm^2 + h_nm^2), of the last
+    main field of IGRF up to its highest degree, at a height [m] above the mean surface.
+    """
+    from ppigrf import ppigrf  # here: as above
+
+    ratio = _REFERENCE_RADIUS / (_REFERENCE_RADIUS + height)
+    g, h = (coefficients.iloc[-2] for coefficients in ppigrf.read_shc(ppigrf.shc_fn))
+    power = sum((n + 1) * ratio ** (2 * n + 4) * (g[n, m] ** 2 + h[n, m] ** 2) for n, m in g.index if n > degree)
+    return 1e-9 * math.sqrt(power / 3.0)
 
 
 def _date_in_model(date_ns: int) -> datetime:

@@ -14,7 +14,7 @@ from css_common.vectors import multiply
 from css_environment.constants import ASTRONOMICAL_UNIT
 from css_environment.earth_rotation import dcm_en_at
 from css_environment.ephemeris import SEGMENT_S, at, build_ephemeris, segment_start
-from css_environment.magnetic_field import field_along_orbit
+from css_environment.magnetic_field import HIGHEST_DEGREE, field_along_orbit, omitted_field
 from css_environment.orbit import TleOrbit, keplerian_orbit, orbit_states
 
 EPOCH_NS = 1_370_044_800 * 10**9
@@ -130,3 +130,14 @@ def test_range_of_the_tables():
     assert ephemeris.r_n.shape == (7, 3)
     assert np.all(np.isfinite(np.hstack([np.ravel(x) for x in at(ephemeris, 170.0)])))
     assert at(ephemeris, 130.0).field_n == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("degree", [4, 6, 10])
+def test_what_a_short_field_model_leaves_out(degree):
+    """Root mean square over the sphere, against the two models side by side."""
+    directions = np.random.default_rng(3).normal(size=(4000, 3))
+    places = 6_771_200.0 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    when = (np.zeros(len(places)), np.eye(3), 1_577_836_800 * 10**9)
+    off = field_along_orbit(places, *when, degree) - field_along_orbit(places, *when)
+    assert omitted_field(degree) == pytest.approx(np.sqrt(np.mean(off**2)), rel=0.05)
+    assert omitted_field(HIGHEST_DEGREE) == 0.0 < omitted_field(degree, 800e3) < omitted_field(degree)

@@ -13,7 +13,7 @@ from css_common.readings import Readings
 from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
 from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeSolution
-from css_estimation.sun.error_covariance import CALIBRATION
+from css_estimation.sun.error_covariance import FURTHER
 from css_estimation.sun.sun_heading import SunHeading
 from css_msgs.msg import CssVoltages, WheelState
 
@@ -86,7 +86,7 @@ def attitude_estimate_fields(solution: AttitudeSolution, covariance: np.ndarray)
         reported[0] = -1.0
     else:
         quaternion = np.array(_to_quaternion(solution.sigma_bn))
-        reported = covariance[:CALIBRATION, :CALIBRATION].ravel()
+        reported = covariance[:FURTHER, :FURTHER].ravel()
     return {
         "q_bn": quaternion,
         "omega_bn_b": np.array(solution.omega_bn_b),

@@ -132,3 +132,10 @@ class Run:
         """Angle of estimated to true Sun."""
         sun_b = np.array(mrp_to_dcm(self.solution.sigma_bn)) @ SUN_N
         return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(sun_b, scene.sun_b)), sun_b @ scene.sun_b)))
+
+    def nees(self, scene):
+        """Attitude error squared, normalised by the filter's covariance: 3 in the mean of a consistent filter."""
+        estimated = Rotation.from_matrix(np.array(mrp_to_dcm(self.solution.sigma_bn)))
+        # of frames, b true relative to b estimated
+        turn = -(scene.attitude * estimated.inv()).as_rotvec()
+        return float(turn @ np.linalg.solve(self.memory.covariance[:3, :3], turn))

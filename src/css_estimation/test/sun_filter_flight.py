@@ -7,8 +7,7 @@ from okeefe_spacecraft import okeefe_values
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.matrices import IDENTITY
 from css_common.vectors import angle_between, matmul, multiply, unit
-from css_environment.albedo import plane_screen
-from css_environment.albedo_gradient import albedo_gradient
+from css_environment.albedo import albedo_output, new_workspace
 from css_environment.earth_light import albedo_sources, new_earth_view, new_light
 from css_estimation.nodes.sun_filter import SunFilter
 from css_estimation.sun.sun_heading import UNAIDED, UNKNOWN_SKY
@@ -60,10 +59,9 @@ class SunFilterFlight:
         """Outputs of this cycle, with part of the Sun's disc in view."""
         outputs = part * outputs_of(self.p, self.sun_b)
         if self.sky.known:
-            albedo = np.zeros((len(outputs), 4))
-            screen = plane_screen(self.p.screen.axis_b)
-            albedo_gradient(self.light, self.p.cells, screen, self.p.cos_half_view, self.dcm_bn, albedo)
-            outputs = outputs + part * albedo[:, 0]
+            albedo, p = np.zeros(len(outputs)), self.p
+            albedo_output(self.light, p.cells, p.screen, p.cos_half_view, self.dcm_bn, new_workspace(), albedo)
+            outputs = outputs + part * albedo
         return outputs + self.white * self.dice.normal(size=len(outputs))
 
     def step(self, *, gyro=False, part=1.0, wheels=True, change=None):

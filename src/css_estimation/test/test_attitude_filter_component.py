@@ -112,11 +112,12 @@ def test_the_field_of_its_own_model_may_differ(references):
     np.testing.assert_allclose(offset - exact, [1e-7, 0.0, -5e-8], atol=1e-15)
 
 
-def test_light_of_the_earth_is_predicted_only_when_asked_for(references):
-    assert not references.light.any()
-    compensating = FlightReferences(values_of(albedo__compensate=True))
-    compensating.at(100.0)
-    assert compensating.light.any()
+def test_light_of_the_earth_is_predicted_unless_it_is_not_wanted(references):
+    references.at(100.0)
+    assert references.light.any()
+    blind = FlightReferences(values_of(albedo__compensate=False))
+    blind.at(100.0)
+    assert not blind.light.any()
 
 
 def test_a_vector_cannot_calibrate_cells():

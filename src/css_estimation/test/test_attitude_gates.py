@@ -12,6 +12,7 @@ from css_common.attitude import mrp_to_dcm
 from css_common.kernel import typed_call
 from css_estimation.attitude import attitude_update
 from css_estimation.attitude.attitude_solution import USED_FIELD, USED_SUN
+from css_estimation.attitude.slow_errors import FIELD, FIELD_RATE, MAGNETOMETER
 
 _measure = typed_call(attitude_update.measure)
 NOTHING = np.full(6, np.nan)
@@ -41,7 +42,7 @@ class Converged:
         memory = copy.deepcopy(run.memory)
         field_b, given = field
         return _measure(
-            p or run.p, run.state, memory, voltages, tuple(map(float, field_b)), given, self.references, NO_LIGHT
+            p or run.p, run.state, memory, voltages, tuple(map(float, field_b)), given, True, self.references, NO_LIGHT
         )
 
     def cell(self, i, q):
@@ -100,7 +101,8 @@ def directions(count, seed):
     return v / np.linalg.norm(v, axis=1, keepdims=True)
 
 
-def test_the_gate_of_the_field_is_that_of_two(converged):
+def test_the_gate_of_the_field_is_that_of_two():
+    converged = Converged(error_model="white")
     limit = chi2.isf(1e-3, 2)
     strength = np.linalg.norm(converged.field_b)
     along = converged.field_b / strength
@@ -114,6 +116,26 @@ def test_the_gate_of_the_field_is_that_of_two(converged):
             _, tally = converged.measure(field=(field_b, True))
             assert (tally.taken, tally.used, tally.refused) == ((2, USED_FIELD, False) if taken else (0, 0, True))
             assert tally.nis == pytest.approx(share * limit if taken else 0.0, rel=1e-6)
+
+
+def test_the_gate_of_a_field_that_errs_lastingly_is_that_of_three(converged):
+    limit = chi2.isf(1e-3, 3)
+    strength = np.linalg.norm(converged.field_b)
+    x, y, z = converged.field_b
+    whole = converged.run.memory.covariance
+    h = np.zeros((3, len(whole)))
+    h[:, :3] = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    h[:, MAGNETOMETER:FIELD] = np.eye(3)
+    h[:, FIELD:FIELD_RATE] = mrp_to_dcm(converged.run.state.sigma_bn)
+    s = h @ whole @ h.T + (FIELD_VARIANCE + converged.neglected * strength**2) * np.eye(3)
+    for off in directions(10, 4):
+        unit = off / np.sqrt(off @ np.linalg.solve(s, off))
+        for share, taken in ((0.98, True), (1.02, False)):
+            field_b = converged.field_b + np.sqrt(share * limit) * unit
+            _, tally = converged.measure(field=(field_b, True))
+            assert (tally.taken, tally.used, tally.refused) == ((3, USED_FIELD, False) if taken else (0, 0, True))
+            # the filter believes in a bias of a few nT by now
+            assert tally.nis == pytest.approx(share * limit if taken else 0.0, rel=0.02)
 
 
 def test_the_gate_of_a_sun_vector_is_that_of_three():

@@ -33,7 +33,7 @@ def calibrated():
 def test_scale_errors_of_five_to_twenty_percent_are_found(calibrated):
     for run, _, _ in calibrated:
         found = run.memory.calibration[:, 0]
-        sigma = np.sqrt(np.diag(run.memory.covariance)[6:])
+        sigma = np.sqrt(np.diag(run.memory.covariance)[run.p.cells.calibration_at :])
         # in some tumbles the Sun never comes near the normal of one face
         seen = sigma < 0.02
         assert np.count_nonzero(seen) >= 5
@@ -53,7 +53,7 @@ def test_the_heading_gains_by_calibration(calibrated):
 def test_considered_errors_stay_and_keep_the_filter_honest():
     run, heading, _ = fly(1, calibration__mode="consider", calibration__scale_sigma=0.15)
     np.testing.assert_array_equal(run.memory.calibration[:, 0], 1.0)
-    np.testing.assert_allclose(np.diag(run.memory.covariance)[6:], 0.15**2)
+    np.testing.assert_allclose(np.diag(run.memory.covariance)[run.p.cells.calibration_at :], 0.15**2)
     assert heading < fly(1)[1]
 
 
@@ -65,6 +65,6 @@ def test_alignment_is_found_too():
     scene_run, heading, _ = fly(4, normals=tilted, **changes)
     off = np.abs(scene_run.memory.calibration[:, 0] - SCALES)
     # the Sun may meet a cell at one angle alone, which its scale and its tilt explain equally well: it says so
-    assert (off < 4.0 * np.sqrt(np.diag(scene_run.memory.covariance)[6::3])).all()
+    assert (off < 4.0 * np.sqrt(np.diag(scene_run.memory.covariance)[scene_run.p.cells.calibration_at :: 3])).all()
     assert np.count_nonzero(off < 0.01) >= 4
     assert heading < 0.8 * fly(4, normals=tilted, calibration__mode="estimate", calibration__scale_sigma=0.15)[1]

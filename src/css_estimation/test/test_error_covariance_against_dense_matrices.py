@@ -11,15 +11,20 @@ from scipy.linalg import expm
 from css_common.attitude import rotation_vector_to_dcm
 from css_estimation.sun.error_covariance import (
     CORRECTION,
+    Block,
     Partials,
     attitude_block,
     begin_update,
     bound,
+    covariance_of,
+    fade,
     innovate,
+    mix,
     neglected_variance,
     new_work,
     propagate,
     set_block,
+    set_single,
     update,
 )
 from css_estimation.symmetric import inverse_form
@@ -90,16 +95,18 @@ def test_without_gyro_the_bias_turns_nothing(rng):
 
 
 def numbers(rng, n, count):
-    """Random measurements of attitude, and of the calibration of cells with three errors each."""
-    cells = (n - 6) // 3
+    """Random measurements of attitude, and of two blocks of three and of two further errors each."""
     rows, partials = np.zeros((count, n)), []
     for k in range(count):
         rows[k, :3] = rng.normal(size=3)
-        first = 6 + 3 * int(rng.integers(cells)) if cells else 0
-        if cells:
-            rows[k, first : first + 3] = rng.normal(size=3)
-        calibration = tuple(rows[k, first : first + 3].tolist()) if cells else (0.0, 0.0, 0.0)
-        partials.append(Partials(tuple(rows[k, :3].tolist()), first, 3 if cells else 0, calibration))
+        blocks = []
+        for errors in (3, 2):
+            first = int(rng.integers(6, n - 2)) if n > 6 else 0
+            slopes = rng.normal(size=3)
+            if n > 6:
+                rows[k, first : first + errors] += slopes[:errors]
+            blocks.append(Block(first, errors if n > 6 else 0, tuple(slopes.tolist())))
+        partials.append(Partials(tuple(rows[k, :3].tolist()), *blocks))
     return rows, partials
 
 
@@ -141,6 +148,43 @@ def test_considered_errors_keep_their_covariance_and_count_as_errors(rng):
     np.testing.assert_allclose(p, a @ before @ a.T + r * np.outer(k, k), atol=1e-14)
     np.testing.assert_array_equal(p[6:, 6:], before[6:, 6:])
     np.testing.assert_allclose(work[CORRECTION], k * residual, atol=1e-15)
+
+
+def test_the_covariance_of_two_numbers(rng):
+    p = random_covariance(rng, 15)
+    rows, (a, b) = numbers(rng, 15, 2)
+    assert covariance_of(p, a, b) == pytest.approx(rows[0] @ p @ rows[1], rel=1e-12)
+    assert covariance_of(p, b, a) == pytest.approx(covariance_of(p, a, b), rel=1e-12)
+
+
+def test_an_error_that_fades(rng):
+    p = random_covariance(rng, 8)
+    f = np.eye(8)
+    f[7, 7] = 0.9
+    expected = f @ p @ f.T
+    expected[7, 7] += 0.3
+    fade(p, 7, 0.9, 0.3)
+    np.testing.assert_allclose(p, expected, rtol=1e-12)
+    set_single(p, 7, 2.0)
+    assert p[7, 7] == 2.0 and not p[7, :7].any() and not p[:7, 7].any()
+
+
+@pytest.mark.parametrize("dt", [0.1, 1.0, 300.0])
+def test_an_error_and_its_rate_by_the_matrix_exponential(rng, dt):
+    """Critically damped: e'' = -2 b e' - b^2 e + noise, whose lasting variances are v and v b^2."""
+    rate, variance = 0.01, 0.7
+    f = np.array([[0.0, 1.0], [-(rate**2), -2.0 * rate]])
+    q = np.diag([0.0, 4.0 * rate**3 * variance])
+    exponential = expm(dt * np.block([[-f, q], [np.zeros((2, 2)), f.T]]))
+    forward = exponential[2:, 2:].T
+    p = random_covariance(rng, 9)
+    whole = np.eye(9)
+    whole[np.ix_([6, 8], [6, 8])] = forward
+    expected = whole @ p @ whole.T
+    expected[np.ix_([6, 8], [6, 8])] += forward @ exponential[:2, 2:]
+    mix(p, 6, 8, tuple(forward.ravel().tolist()), variance, variance * rate**2)
+    np.testing.assert_allclose(p, expected, rtol=1e-9, atol=1e-12)
+    np.testing.assert_array_equal(p, p.T)
 
 
 def test_a_bound_scales_errors_and_keeps_correlations(rng):

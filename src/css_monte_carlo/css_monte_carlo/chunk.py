@@ -52,7 +52,7 @@ def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
     flight = _flight_of(task.mission_text, task.origin, task.estimator)
     numbers = np.arange(task.first_case, task.first_case + task.cases)
     if isinstance(flight, SteppedFlight):
-        tallies, cpu_s = flight.fly(numbers, task.sample_every)
+        tallies, cpu_s = flight.fly(numbers, task.sample_every, task.guess_deg)
     else:
         tallies, _, cpu_s = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
     period_s = flight.mission.period_ns * 1e-9

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_analysis.flight_metrics import windows_of
-from css_common.attitude import mrp_add, rotation_vector_to_mrp
 from css_common.mission import Event, Mission, Node
-from css_common.random_streams import RandomKey, Stream, normal4, random_key
+from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values, default_values, shaped_values
 from css_common.sections import wheel_axes
 from css_common.stepping import first_step
@@ -19,9 +18,9 @@ from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
-from css_estimation.attitude.attitude_options import GivenStart
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
+from css_monte_carlo.attitude_guess import guessed_start
 from css_monte_carlo.case_tallies import step_marks
 from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
@@ -188,7 +187,7 @@ class MissionFlight:
             return None, None
         p = _parameters(self._filter, self._filter.values)
         if guess_deg > 0.0:
-            p = p._replace(start=_guessed_start(key, sigma_bn, guess_deg))
+            p = p._replace(start=guessed_start(key, sigma_bn, guess_deg))
         algorithm = _algorithm(self._filter)
         return algorithm.initial_state(p), algorithm.initial_memory(p)
 
@@ -264,14 +263,6 @@ def _algorithm(node: Node) -> Any:
 def _parameters(node: Node | None, values: Values | None) -> Any:
     """Parameters of the algorithm of the node of an estimator or a control law, None without the node."""
     return None if node is None else _algorithm(node).parameters(values)
-
-
-def _guessed_start(key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> GivenStart:
-    """A start beside the true attitude, by a draw of `guess_deg` [deg] about each axis, 1 sigma."""
-    sigma = math.radians(guess_deg)
-    x, y, z, _ = normal4(key, Stream.ATTITUDE_GUESS, 0, 0)
-    guess = mrp_add(sigma_bn, rotation_vector_to_mrp((sigma * x, sigma * y, sigma * z)))
-    return GivenStart(True, guess, sigma**2)
 
 
 def _is_on(sensor: Node | None, done: list[Event]) -> bool:

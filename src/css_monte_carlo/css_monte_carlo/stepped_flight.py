@@ -11,6 +11,7 @@ import numpy as np
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission, MissionError
 from css_common.random_streams import RandomKey, random_key
+from css_monte_carlo.attitude_guess import takes_guess, with_guess
 from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.direct_flight import fly_checked
 from css_monte_carlo.errors import StudyError
@@ -47,8 +48,8 @@ class SteppedFlight:
         self.measure = ATTITUDE if is_attitude(node) else HEADING
         self._estimator = node.name
 
-    def fly(self, numbers: np.ndarray, sample_every: int) -> tuple[CaseTallies, float]:
-        """Running sums of cases (C,), and processor time [s].
+    def fly(self, numbers: np.ndarray, sample_every: int, guess_deg: float = 0.0) -> tuple[CaseTallies, float]:
+        """Running sums of cases (C,), and processor time [s]; `guess_deg` as of `MissionFlight.cases`.
 
         Raises:
             StudyError: a spacecraft turns faster than can be computed.
@@ -59,12 +60,14 @@ class SteppedFlight:
             len(numbers), self.mission.steps, period_s, sample_every, windows_of(self.mission)
         )
         for c, number in enumerate(numbers):
+            key = random_key(self.mission.values.mission.seed, int(number))
             flown = self.mission.with_overrides([f"mission.case={number}"])
+            if guess_deg > 0.0 and takes_guess(flown, self._estimator):
+                flown = with_guess(flown, key, guess_deg)
             try:
                 log = fly_checked(flown)
             except MotionError as error:
                 raise StudyError(f"case {number} of {flown.name}: {error}") from error
-            key = random_key(flown.values.mission.seed, int(number))
             if isinstance(tallies, AttitudeTallies):
                 tally_attitudes(tallies, c, log, self._estimator, self._gyro_bias(key))
             else:

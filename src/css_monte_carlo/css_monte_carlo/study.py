@@ -15,6 +15,7 @@ from css_common.kernel import study_hash
 from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
+from css_monte_carlo.attitude_guess import takes_guess
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.direct_flight import configured, is_attitude_filter
 from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
@@ -118,8 +119,9 @@ def run_study(
     configurations = tuple(configurations)
     missions = [configuration.applied(mission) for configuration in configurations]
     stepped = [_why_stepped(flown, c.estimator) for flown, c in zip(missions, configurations, strict=True)]
-    if guess_deg > 0.0 and any(stepped):
-        raise MissionError(f"{next(filter(None, stepped))}: attitude filters can be given no guess")
+    if guess_deg > 0.0:
+        for configuration, flies, reason in zip(configurations, missions, stepped, strict=True):
+            _check_guess(flies, configuration.estimator, reason)
     doubts = [line for flown in missions for line in preflight(flown)]
     doubts += [f"{reason}; flown node by node, some hundred times slower" for reason in stepped if reason]
     warnings = tuple(dict.fromkeys(doubts))
@@ -180,6 +182,11 @@ def _why_stepped(mission: Mission, estimator: str) -> str | None:
     except NoPlace as reason:
         return str(reason)
     return None
+
+
+def _check_guess(mission: Mission, estimator: str, why_stepped: str | None) -> None:
+    if why_stepped and is_attitude_filter(mission, estimator) and not takes_guess(mission, estimator):
+        raise MissionError(f"{why_stepped}: attitude filters can be given no guess")
 
 
 def _ranges(first_case: int, end: int, size: int) -> list[tuple[int, int]]:

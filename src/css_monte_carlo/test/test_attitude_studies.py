@@ -25,6 +25,7 @@ CONFIGURATIONS = (
     Configuration("attitude_vector", True),
     Configuration("attitude_voltage", True),
     Configuration("attitude_voltage", False, ("css_array.albedo.enabled=true", "css_array.albedo.draw=per_cell")),
+    Configuration("attitude_voltage", True, ("mission.epoch=2013-12-01T06:00:00Z", "orbit.raan_deg=245")),
 )
 CASES = 5
 FIGURES = [quantity.name for quantity in attitude_quantities(Windows())]
@@ -48,7 +49,7 @@ def whole(tmp_path_factory):
 def test_tables_hold_every_case_and_time(whole):
     assert MISSION.events
     assert whole.cases.column_names == ["estimator", "gyro", "overrides", "case", *FIGURES]
-    assert whole.cases.num_rows == 3 * CASES
+    assert whole.cases.num_rows == len(CONFIGURATIONS) * CASES
     assert set(whole.percentiles["quantity"].to_pylist()) == set(SAMPLED)
     error = rows_of(whole.percentiles, estimator="attitude_vector", quantity="attitude_error_deg")
     assert error["time_s"].to_pylist() == [float(t) for t in range(360)]
@@ -59,9 +60,18 @@ def test_tables_hold_every_case_and_time(whole):
 
 def test_filters_share_their_guess(whole):
     first = rows_of(whole.percentiles, quantity="attitude_sigma_deg", time_s=0.0)["p50"].to_numpy()
-    assert np.all(first < 20.0 * np.sqrt(3.0)) and len(first) == 3
+    assert np.all(first < 20.0 * np.sqrt(3.0) + 1.0) and len(first) == len(CONFIGURATIONS)
     assert whole.manifest["attitude_filters"] == ["attitude_vector", "attitude_voltage"]
     assert whole.manifest["guess_deg"] == 20.0
+
+
+def test_another_date_and_orbit_are_other_flights_of_the_same_cases(whole):
+    here = rows_of(whole.cases, estimator="attitude_voltage", gyro=True, overrides="")
+    (elsewhere,) = [" ".join(c.overrides) for c in CONFIGURATIONS if "orbit.raan_deg=245" in c.overrides]
+    there = rows_of(whole.cases, estimator="attitude_voltage", gyro=True, overrides=elsewhere)
+    assert here["case"].equals(there["case"])
+    a, b = (rows["attitude_error_mean_deg"].to_numpy() for rows in (here, there))
+    assert np.all(a != b) and np.all(b < 2.0)
 
 
 def test_another_guess_is_another_study(whole):
@@ -87,7 +97,7 @@ def test_interrupted_study_goes_on_and_ends_with_the_same_bytes(whole, tmp_path,
         fly(tmp_path / "s", progress=stop)
     with pytest.raises(StudyError, match="holds no complete study"):
         read_study(tmp_path / "s")
-    assert fly(tmp_path / "s").flown < 3 * CASES * 360
+    assert fly(tmp_path / "s").flown < len(CONFIGURATIONS) * CASES * 360
     assert contents(tmp_path / "s") == contents(whole.folder)
 
 

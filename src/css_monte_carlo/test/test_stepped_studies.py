@@ -22,15 +22,15 @@ SHORT = {
 }
 
 
-@pytest.mark.parametrize("kind", SHORT)
-def test_cases_are_measured_as_by_the_loop(kind):
+@pytest.mark.parametrize(("kind", "guess_deg"), [*((kind, 0.0) for kind in SHORT), ("attitude filter", 20.0)])
+def test_cases_are_measured_as_by_the_loop(kind, guess_deg):
     mission, estimator = SHORT[kind]()
     cases = np.array([0, 3])
     compiled, stepped = MissionFlight(mission, estimator), SteppedFlight(mission, estimator)
     assert compiled.measure is stepped.measure
     windows = windows_of(mission)
-    expected = case_table(cases, fly_cases(compiled, cases, 10).tallies, 1.0, windows)
-    found = case_table(cases, stepped.fly(cases, 10)[0], 1.0, windows)
+    expected = case_table(cases, fly_cases(compiled, cases, 10, guess_deg).tallies, 1.0, windows)
+    found = case_table(cases, stepped.fly(cases, 10, guess_deg)[0], 1.0, windows)
     assert found.column_names == expected.column_names
     assert len(found.column_names) > 10
     for name in found.column_names:
@@ -81,6 +81,6 @@ def test_what_measures_nothing_is_refused():
         SteppedFlight(load_mission("esprit_2006"), "coning")
 
 
-def test_a_stepped_filter_is_given_no_guess(tmp_path):
+def test_an_attitude_that_is_solved_for_is_given_no_guess(tmp_path):
     with pytest.raises(MissionError, match="no place for the node rocket: attitude filters can be given no guess"):
         run_study(load_mission("esprit_2006"), [Configuration("triad", True)], 1, tmp_path / "s", guess_deg=5.0)

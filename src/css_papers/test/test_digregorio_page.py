@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of DiGregorio & Crassidis, with few cases."""
 
-from css_papers.digregorio.flights import DIODES
+import pytest
+
+from css_common.mission import load_mission
+from css_papers.digregorio import robustness
+from css_papers.digregorio.flights import DIODES, FILTERS, MISSION
 from css_papers.papers import Request, find_paper
 
 
@@ -15,3 +19,16 @@ def test_the_page_has_its_numbers_and_figures(tmp_path):
     text = (tmp_path / "README.md").read_text(encoding="utf-8")
     for picture in ("case_0_six.png", "case_0_four.png", "error_over_cases.png"):
         assert picture in text and (tmp_path / picture).stat().st_size > 10_000
+
+
+def test_filters_are_judged_in_another_world(monkeypatch):
+    monkeypatch.setattr(robustness, "_HOURS", range(0, 24, 12))
+    told = []
+    judged = robustness.judge(load_mission(MISSION), "1.5 times as bright", 2, lambda *done: told.append(done))
+    assert told == [(1, 2), (2, 2)]
+    assert set(judged) == {(name, errors) for name in FILTERS for errors in ("lasting", "white")}
+    for name in FILTERS:
+        lasting, white = judged[name, "lasting"], judged[name, "white"]
+        assert lasting.mean < 0.3 < white.mean
+        assert lasting.nees == pytest.approx(3.0, rel=0.4) and white.nees > 6.0
+        assert lasting.mean < lasting.largest < white.largest

@@ -8,17 +8,25 @@ turns with the mean of the gyro's readings at both ends, which is exact for a ra
 
 It begins, and begins anew, from the Sun and the field together (`attitude_start`): when it has never had an attitude,
 when a step was too long to be bridged, when its uncertainty has grown beyond use, and when the field or the Sun has
-contradicted it for too long.
+contradicted it for too long. Until all rolls about the field have been weighed (`roll_search`) no attitude is taken for
+sure: a wide one is not narrowed by the cells, in which it might settle wrongly, and one that is not where the weight is
+gives way.
 
 An attitude filter is a module with `parameters(values)`, `initial_state(p)`, `initial_memory(p)` and the kernel `step`
 below. What `parameters` returns is a NamedTuple that the module itself defines: by its type a study finds the module.
 """
 
-from css_common.attitude import dcm_to_mrp, mrp_add, rotation_vector_to_dcm, rotation_vector_to_mrp
+from css_common.attitude import (
+    dcm_to_mrp,
+    mrp_add,
+    rotation_vector_to_dcm,
+    rotation_vector_to_mrp,
+)
 from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, add, scale, subtract
-from css_estimation.attitude import attitude_options, attitude_solution
+from css_estimation.attitude import attitude_options, attitude_solution, roll_search, slow_errors
+from css_estimation.attitude.attitude_confirmation import begun_at, judged, search_roll
 from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters
 from css_estimation.attitude.attitude_solution import (
     MODE_LOST,
@@ -37,6 +45,7 @@ from css_estimation.attitude.attitude_solution import (
     AttitudeState,
     with_alignment,
     with_attitude,
+    with_search,
 )
 from css_estimation.attitude.attitude_update import Tally, find_start, measure
 from css_estimation.attitude.field_direction import plausible_field
@@ -45,7 +54,7 @@ from css_estimation.sun import cell_calibration
 from css_estimation.sun.error_covariance import (
     ATTITUDE,
     BIAS,
-    CALIBRATION,
+    FURTHER,
     attitude_block,
     bound,
     propagate,
@@ -56,6 +65,8 @@ from css_estimation.symmetric import isotropic, trace
 # Trace of the attitude covariance [rad^2] beyond which a fresh start is better: 33 deg for each axis.
 _USELESS = 1.0
 _LONGEST_SPAN = 1e9
+# After so long without field or Sun the search is given up, and a wide attitude is narrowed by what there is [s].
+_LONGEST_IDLE = 30.0
 
 
 class AttitudeEkf(AttitudeParameters):
@@ -106,7 +117,7 @@ def step(
     """
     dt = min(dt, _LONGEST_SPAN) if dt > 0.0 else 0.0
     gyro_ok = _gyro_usable(p, gyro_b, gyro_valid)
-    if state.started:
+    if state.started or state.search.begun:
         state = _predict(p, state, memory, dt, gyro_b, gyro_ok)
     field_ok = field_valid and plausible_field(field_b) and plausible_field(references.field_n)
     tally = Tally(0.0, 0, False, 0, 0)
@@ -116,17 +127,19 @@ def step(
         begun, mask = find_start(p, memory, voltages, field_b, field_ok, references)
         if begun.found:
             started_now = True
-            set_block(memory.covariance, ATTITUDE, begun.covariance)
-            bias_b = state.bias_b
-            if distrusted:
-                bias_b = (0.0, 0.0, 0.0)
-                set_block(memory.covariance, BIAS, isotropic(p.bias_variance))
-            state = with_alignment(with_attitude(state, dcm_to_mrp(begun.dcm_bn), bias_b), True, 0.0)
+            state = begun_at(p, state, memory, dcm_to_mrp(begun.dcm_bn), begun.covariance, distrusted)
+            state = with_search(state, False, roll_search.no_search())
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
+    if not state.confirmed and field_ok:
+        state, moved, mask = search_roll(p, state, memory, dt, voltages, field_b, references, light)
+        if moved:
+            started_now = True
+            tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN if mask != 0 else USED_FIELD)
     if state.aligned and not started_now:
-        state, tally = measure(p, state, memory, voltages, field_b, field_ok, references, light)
-        contradicted = state.contradicted + dt if tally.refused else state.contradicted
-        state = with_alignment(state, True, 0.0 if tally.taken > 0 and not tally.refused else contradicted)
+        narrow = state.confirmed or trace(attitude_block(memory.covariance)) < p.gated_below
+        sun_too = narrow or not state.search.begun or state.search.idle > _LONGEST_IDLE
+        state, tally = measure(p, state, memory, voltages, field_b, field_ok, sun_too, references, light)
+        state = judged(state, tally, dt)
     bound(memory.covariance, memory.largest)
     return _finish(state, gyro_b, gyro_ok, dt, started_now, tally)
 
@@ -144,9 +157,10 @@ def _predict(p, state: AttitudeState, memory: AttitudeMemory, dt: float, gyro_b:
     if dt > p.longest_step:
         # what turned the body meanwhile is unknown; how its bias may have walked is not
         set_block(memory.covariance, ATTITUDE, isotropic(LOST_VARIANCE))
-        for i in range(BIAS, CALIBRATION):
+        for i in range(BIAS, FURTHER):
             memory.covariance[i, i] += p.bias_noise * dt
-        return with_alignment(state, False, 0.0)
+        slow_errors.relax(p.slow, memory.covariance, memory.slow, dt)
+        return with_search(with_alignment(state, False, 0.0), False, roll_search.no_search())
     rate = state.omega_bn_b
     if gyro_ok:
         mean = scale(0.5, add(state.gyro_b, gyro_b)) if state.gyro_known else gyro_b
@@ -154,7 +168,10 @@ def _predict(p, state: AttitudeState, memory: AttitudeMemory, dt: float, gyro_b:
     turn = scale(dt, rate)
     noise = p.angle_noise if gyro_ok else p.noise_without_gyro
     propagate(memory.covariance, rotation_vector_to_dcm(turn), dt, noise, p.bias_noise, gyro_ok)
-    cell_calibration.add_drift(p.cells.calibration, memory.covariance, dt)
+    slow_errors.relax(p.slow, memory.covariance, memory.slow, dt)
+    cell_calibration.add_drift(p.cells.calibration, p.cells.calibration_at, memory.covariance, dt)
+    if state.search.begun:
+        state = with_search(state, state.confirmed, roll_search.turned(state.search, turn, dt))
     return with_attitude(state, mrp_add(state.sigma_bn, rotation_vector_to_mrp(turn)), state.bias_b)
 
 
@@ -179,7 +196,17 @@ def _finish(
     omega_bn_b = subtract(gyro_b, state.bias_b) if gyro_ok else state.omega_bn_b
     last_b = gyro_b if gyro_ok else (0.0, 0.0, 0.0)
     after = AttitudeState(
-        started, state.aligned, state.sigma_bn, state.bias_b, omega_bn_b, last_b, gyro_ok, age, state.contradicted
+        started,
+        state.aligned,
+        state.sigma_bn,
+        state.bias_b,
+        omega_bn_b,
+        last_b,
+        gyro_ok,
+        age,
+        state.contradicted,
+        state.confirmed,
+        state.search,
     )
     return after, AttitudeSolution(
         state.sigma_bn,

@@ -11,10 +11,12 @@ from css_common.conversions import square_of_degrees
 from css_common.declared import builder, given, made, part, table_of
 from css_common.schema import choice, flag, real, reals
 from css_common.vectors import Vec3, vector_of
+from css_estimation.attitude import slow_errors
 from css_estimation.attitude.cell_voltages import CellModel
 from css_estimation.attitude.flight_references import COMPENSATE
+from css_estimation.attitude.slow_errors import SlowErrors
 from css_estimation.sun import cell_calibration
-from css_estimation.sun.error_covariance import CALIBRATION
+from css_estimation.sun.error_covariance import BIAS, FURTHER
 
 LOST_VARIANCE = math.pi**2 / 3.0
 """Variance [rad^2] of each component of the attitude error when nothing is known."""
@@ -73,7 +75,7 @@ class AttitudeParameters(NamedTuple):
             "field_sigma_nt",
             200.0,
             "nT",
-            "error of magnetometer and field model, per axis, 1 sigma",
+            "white error of magnetometer and field model, per axis, 1 sigma",
             low=0.0,
             open_low=True,
             high=1e6,
@@ -127,6 +129,7 @@ class AttitudeParameters(NamedTuple):
         real("longest_step", 10.0, "s", "after a longer step the attitude is lost", low=0.0, open_low=True, high=1e6)
     )
     compensates_albedo: bool = given(COMPENSATE)
+    slow: SlowErrors = part(SlowErrors)
 
 
 PARAMETERS = table_of(AttitudeParameters)
@@ -136,10 +139,6 @@ parameters = builder(AttitudeParameters)
 def largest_variances(p: AttitudeParameters) -> np.ndarray:
     """Variances (n,) above which errors say no more."""
     c = p.cells.calibration
-    n = CALIBRATION + c.per_cell * len(p.cells.layout.cells)
-    largest = np.full(n, LOST_VARIANCE)
-    largest[3:6] = 100.0 * p.bias_variance + 1e-12
-    for i in range(CALIBRATION, n):
-        variance = cell_calibration.initial_variance(c, (i - CALIBRATION) % c.per_cell)
-        largest[i] = 4.0 * variance + 1e-12
-    return largest
+    scales = [4.0 * cell_calibration.initial_variance(c, k) + 1e-12 for k in range(c.per_cell)]
+    largest = [LOST_VARIANCE] * BIAS + [100.0 * p.bias_variance + 1e-12] * (FURTHER - BIAS)
+    return np.array([*largest, *slow_errors.largest_variances(p.slow), *scales * len(p.cells.layout.cells)])

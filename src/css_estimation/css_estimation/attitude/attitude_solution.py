@@ -9,8 +9,10 @@ from css_common.kernel import kernel
 from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
 from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters, largest_variances
+from css_estimation.attitude.roll_search import RollSearch, new_weights, no_search
+from css_estimation.attitude.slow_errors import forget, new_slow
 from css_estimation.sun import cell_calibration
-from css_estimation.sun.error_covariance import CALIBRATION, new_work
+from css_estimation.sun.error_covariance import BIAS, FURTHER, new_work
 
 # The numbers of css_msgs/AttitudeEstimate.
 VALIDITY_NONE = 0
@@ -42,6 +44,8 @@ class AttitudeState(NamedTuple):
     gyro_known: bool  # and whether it was one
     age: float  # [s]
     contradicted: float  # [s] for how long the field or the Sun has been refused
+    confirmed: bool  # all rolls about the field have been weighed, and this one is it
+    search: RollSearch
 
 
 class AttitudeMemory(NamedTuple):
@@ -51,8 +55,11 @@ class AttitudeMemory(NamedTuple):
     largest: np.ndarray  # (n,) bounds of the variances
     work: np.ndarray  # (3, n)
     calibration: np.ndarray  # (N, 3)
+    slow: np.ndarray  # (10,) of `slow_errors`
+    weights: np.ndarray  # (36,) of `roll_search`
     outputs: np.ndarray  # (N,) room for outputs relative to the Sun at normal incidence
     albedo: np.ndarray  # (N,) room for predicted light of the Earth
+    albedo_slopes: np.ndarray  # (N, 3) room for its derivatives
     albedo_work: np.ndarray  # (224,) room for its prediction
 
 
@@ -74,7 +81,8 @@ class AttitudeSolution(NamedTuple):
 def initial_state(p: AttitudeParameters) -> AttitudeState:
     """Nothing known, or the given attitude."""
     given = p.start.is_given
-    return AttitudeState(given, given, p.start.sigma_bn if given else _ZERO, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0)
+    sigma_bn = p.start.sigma_bn if given else _ZERO
+    return AttitudeState(given, given, sigma_bn, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0, False, no_search())
 
 
 def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
@@ -85,18 +93,23 @@ def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
     if p.start.is_given:
         for i in range(3):
             covariance[i, i] = p.start.variance
-    for i in range(3, CALIBRATION):
+    for i in range(BIAS, FURTHER):
         covariance[i, i] = p.bias_variance
-    c = p.cells.calibration
-    for i in range(CALIBRATION, len(largest)):
-        covariance[i, i] = cell_calibration.initial_variance(c, (i - CALIBRATION) % c.per_cell)
+    slow = new_slow()
+    forget(p.slow, covariance, slow)
+    c, first = p.cells.calibration, p.cells.calibration_at
+    for i in range(first, len(largest)):
+        covariance[i, i] = cell_calibration.initial_variance(c, (i - first) % c.per_cell)
     return AttitudeMemory(
         covariance=covariance,
         largest=largest,
         work=new_work(len(largest)),
         calibration=cell_calibration.nominal(cells),
+        slow=slow,
+        weights=new_weights(),
         outputs=np.zeros(cells),
         albedo=np.zeros(cells),
+        albedo_slopes=np.zeros((cells, 3)),
         albedo_work=new_workspace(),
     )
 
@@ -106,7 +119,17 @@ def with_attitude(state: AttitudeState, sigma_bn: Vec3, bias_b: Vec3) -> Attitud
     """The state with another attitude and bias."""
     s = state
     return AttitudeState(
-        s.started, s.aligned, sigma_bn, bias_b, s.omega_bn_b, s.gyro_b, s.gyro_known, s.age, s.contradicted
+        s.started,
+        s.aligned,
+        sigma_bn,
+        bias_b,
+        s.omega_bn_b,
+        s.gyro_b,
+        s.gyro_known,
+        s.age,
+        s.contradicted,
+        s.confirmed,
+        s.search,
     )
 
 
@@ -115,5 +138,34 @@ def with_alignment(state: AttitudeState, aligned: bool, contradicted: float) -> 
     """The state with an attitude that holds or does not, and the time [s] of contradiction."""
     s = state
     return AttitudeState(
-        s.started, aligned, s.sigma_bn, s.bias_b, s.omega_bn_b, s.gyro_b, s.gyro_known, s.age, contradicted
+        s.started,
+        aligned,
+        s.sigma_bn,
+        s.bias_b,
+        s.omega_bn_b,
+        s.gyro_b,
+        s.gyro_known,
+        s.age,
+        contradicted,
+        s.confirmed,
+        s.search,
+    )
+
+
+@kernel
+def with_search(state: AttitudeState, confirmed: bool, search: RollSearch) -> AttitudeState:
+    """The state with an attitude that is confirmed or not, and the search for it."""
+    s = state
+    return AttitudeState(
+        s.started,
+        s.aligned,
+        s.sigma_bn,
+        s.bias_b,
+        s.omega_bn_b,
+        s.gyro_b,
+        s.gyro_known,
+        s.age,
+        s.contradicted,
+        confirmed,
+        search,
     )

@@ -4,26 +4,39 @@
 from typing import NamedTuple
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3
-from css_estimation.sun.error_covariance import Partials, attitude_block, begin_update, innovate, update
-from css_estimation.symmetric import Symmetric, add_outer, congruence, inverse_form
+from css_common.vectors import Vec3
+from css_estimation.sun.error_covariance import (
+    Partials,
+    attitude_partials,
+    begin_update,
+    covariance_of,
+    innovate,
+    update,
+)
+from css_estimation.symmetric import inverse_form
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
 
 class DirectionMeasurement(NamedTuple):
-    """Rows of H for the attitude error and what remains of the measurement after the prediction."""
+    """Derivatives of the numbers and what remains of the measurement after the prediction."""
 
-    rows: Mat3
+    rows: tuple[Partials, Partials, Partials]
     residual: Vec3
     variance: float
     dof: int  # rows that count, 0 to 3; those beyond are zeros
 
 
 @kernel
+def attitude_rows(first: Vec3, second: Vec3, third: Vec3) -> tuple[Partials, Partials, Partials]:
+    """Rows of H for the attitude error alone."""
+    return (attitude_partials(first), attitude_partials(second), attitude_partials(third))
+
+
+@kernel
 def no_direction() -> DirectionMeasurement:
     """Nothing measured."""
-    return DirectionMeasurement((_ZERO, _ZERO, _ZERO), _ZERO, 1.0, 0)
+    return DirectionMeasurement(attitude_rows(_ZERO, _ZERO, _ZERO), _ZERO, 1.0, 0)
 
 
 @kernel
@@ -35,10 +48,18 @@ def widened(m: DirectionMeasurement, variance: float, largest: float) -> Directi
 @kernel
 def normalised_innovation(covariance, m: DirectionMeasurement) -> float:
     """Normalised innovation squared of the whole direction, chi-square with `m.dof` degrees of freedom."""
-    s: Symmetric = congruence(m.rows, attitude_block(covariance))
-    for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)):
-        s = add_outer(s, m.variance, axis)
-    return inverse_form(s, m.residual)
+    a, b, c = m.rows
+    return inverse_form(
+        (
+            covariance_of(covariance, a, a) + m.variance,
+            covariance_of(covariance, a, b),
+            covariance_of(covariance, a, c),
+            covariance_of(covariance, b, b) + m.variance,
+            covariance_of(covariance, b, c),
+            covariance_of(covariance, c, c) + m.variance,
+        ),
+        m.residual,
+    )
 
 
 @kernel
@@ -46,6 +67,5 @@ def update_direction(covariance, work, m: DirectionMeasurement, estimated: int) 
     """Covariance and correction after a direction; errors from index `estimated` on are considered."""
     begin_update(work)
     for k in range(m.dof):
-        h = Partials(m.rows[k], 0, 0, _ZERO)
-        innovation, s = innovate(covariance, work, h, m.residual[k], m.variance)
+        innovation, s = innovate(covariance, work, m.rows[k], m.residual[k], m.variance)
         update(covariance, work, innovation, s, estimated)

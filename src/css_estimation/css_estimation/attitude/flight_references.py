@@ -22,7 +22,7 @@ from css_environment.reflectivity import named_reflectivity
 FIELD_DEGREE = integer(
     "reference.field_degree", HIGHEST_DEGREE, "-", "highest degree of the field model", low=1, high=HIGHEST_DEGREE
 )
-COMPENSATE = flag("albedo.compensate", False, "take the predicted light of the Earth off each cell's output")
+COMPENSATE = flag("albedo.compensate", True, "take the predicted light of the Earth off each cell's output")
 
 _FULL_DISC = 0.99
 

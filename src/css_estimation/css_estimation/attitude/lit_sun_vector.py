@@ -3,15 +3,18 @@
 
 s = (N^T N)^-1 N^T V of the lit rows alone: a dark row with an output of zero would bias it. Its covariance is
 sigma^2 (N^T N)^-1, so along the eigenvectors of N^T N its components err independently. Where the lit normals do
-not span space there is no Sun vector, and none is made up.
+not span space there is no Sun vector, and none is made up. The light of the Earth that was taken off the outputs errs
+with attitude and with the Earth's brightness, in all cells together.
 """
 
 import math
 from typing import NamedTuple
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, add, cross, dot, scale
+from css_common.vectors import Mat3, Vec3, add, cross, dot, row, scale
 from css_estimation.attitude.direction_measurement import DirectionMeasurement, no_direction
+from css_estimation.attitude.earth_on_cells import EarthOnCells
+from css_estimation.sun.error_covariance import Block, Partials, no_block
 from css_estimation.sun.least_squares import normal_equations
 from css_estimation.symmetric import eigen
 
@@ -47,16 +50,48 @@ def lit_sun(cells, outputs, mask: int, top: int) -> LitSun:
 
 
 @kernel
-def sun_vector_measurement(sun: LitSun, predicted_b: Vec3, variance: float) -> DirectionMeasurement:
-    """Sun vector against the unit vector `predicted_b`; `variance` of a cell's output. No update below rank 3."""
+def sun_vector_measurement(
+    sun: LitSun, cells, mask: int, predicted_b: Vec3, intensity: float, earth: EarthOnCells, variance: float
+) -> DirectionMeasurement:
+    """Sun vector against the unit vector `predicted_b`. No update below rank 3.
+
+    Args:
+        sun: of the cells in `mask`, whose outputs were relative to the Sun and without light of the Earth.
+        intensity: of the Sun, 1 at 1 AU.
+        earth: light of the Earth as it was taken off.
+        variance: of a cell's output.
+    """
     if sun.rank < 3:
         return no_direction()
-    u, v, w = sun.axes
-    a, b, c = math.sqrt(sun.information[0]), math.sqrt(sun.information[1]), math.sqrt(sun.information[2])
     difference = (sun.vector[0] - predicted_b[0], sun.vector[1] - predicted_b[1], sun.vector[2] - predicted_b[2])
+    root = (math.sqrt(sun.information[0]), math.sqrt(sun.information[1]), math.sqrt(sun.information[2]))
     return DirectionMeasurement(
-        (scale(a, cross(u, predicted_b)), scale(b, cross(v, predicted_b)), scale(c, cross(w, predicted_b))),
-        (a * dot(u, difference), b * dot(v, difference), c * dot(w, difference)),
+        (
+            _row(sun, cells, mask, 0, predicted_b, intensity, earth),
+            _row(sun, cells, mask, 1, predicted_b, intensity, earth),
+            _row(sun, cells, mask, 2, predicted_b, intensity, earth),
+        ),
+        (
+            root[0] * dot(sun.axes[0], difference),
+            root[1] * dot(sun.axes[1], difference),
+            root[2] * dot(sun.axes[2], difference),
+        ),
         variance,
         3,
     )
+
+
+@kernel
+def _row(sun: LitSun, cells, mask: int, k: int, predicted_b: Vec3, intensity: float, earth: EarthOnCells) -> Partials:
+    """Derivatives of the component along the k-th eigenvector, scaled to the variance of one cell."""
+    axis, root = sun.axes[k], math.sqrt(sun.information[k])
+    attitude = scale(root, cross(axis, predicted_b))
+    if not earth.counts:
+        return Partials(attitude, no_block(), no_block())
+    by_brightness = 0.0
+    for i in range(earth.light.shape[0]):
+        if mask >> i & 1 == 1:
+            share = dot(axis, (cells[i].nx, cells[i].ny, cells[i].nz)) / (root * intensity)
+            attitude = add(attitude, scale(share * earth.brightness, row(earth.slopes, i)))
+            by_brightness += share * earth.light[i]
+    return Partials(attitude, no_block(), Block(earth.at, earth.errors, (by_brightness, 0.0, 0.0)))

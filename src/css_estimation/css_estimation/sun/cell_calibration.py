@@ -2,7 +2,7 @@
 """Scale and alignment of each cell as errors of the attitude filter (Springmann & Cutler 2014; O'Keefe & Schaub 2015).
 
 A cell reads C (n.s) with its scale C and its normal n = unit(n0 + a e1 + b e2), e1 and e2 across the nominal normal
-n0. What is calibrated of each cell follows the six errors of attitude and bias: C, or C, a and b. Estimated, they are
+n0. What is calibrated of each cell is the last of a filter's errors: C, or C, a and b. Estimated, they are
 corrected; considered, they keep their value and variance and only make the filter trust the cells less.
 """
 
@@ -15,7 +15,6 @@ from css_common.declared import made
 from css_common.kernel import kernel
 from css_common.schema import choice, flag, real
 from css_common.vectors import Vec3, add, axes_across, dot, scale, unit
-from css_estimation.sun.error_covariance import CALIBRATION
 
 SCALE, TILT_1, TILT_2 = 0, 1, 2
 """Columns of the calibration of the cells, (N, 3)."""
@@ -90,12 +89,16 @@ def initial_variance(p: CellCalibration, k: int) -> float:
 
 
 @kernel
-def add_drift(p: CellCalibration, covariance, dt: float) -> None:
-    """Walk of the calibration errors over `dt` [s]; considered ones have none, their variance is what it is."""
+def add_drift(p: CellCalibration, first: int, covariance, dt: float) -> None:
+    """Walk of the calibration errors over `dt` [s]; considered ones have none, their variance is what it is.
+
+    Args:
+        first: index of the first of them.
+    """
     if not p.estimated:
         return
-    for i in range(CALIBRATION, covariance.shape[0]):
-        k = (i - CALIBRATION) % p.per_cell
+    for i in range(first, covariance.shape[0]):
+        k = (i - first) % p.per_cell
         covariance[i, i] += dt * (p.scale_noise if k == SCALE else p.alignment_noise)
 
 
@@ -122,13 +125,17 @@ def calibration_partials(light: float, brightness: float, e1: Vec3, e2: Vec3, su
 
 
 @kernel
-def correct(p: CellCalibration, calibration, correction) -> None:
-    """Applies the gathered corrections (n,) of all errors; scales and tilts stay within what a cell can have."""
+def correct(p: CellCalibration, first: int, calibration, correction) -> None:
+    """Applies the gathered corrections (n,) of all errors; scales and tilts stay within what a cell can have.
+
+    Args:
+        first: index of the first calibration error.
+    """
     if not p.estimated:
         return
     for i in range(calibration.shape[0]):
         for k in range(p.per_cell):
-            value = calibration[i, k] + correction[CALIBRATION + p.per_cell * i + k]
+            value = calibration[i, k] + correction[first + p.per_cell * i + k]
             if k == SCALE:
                 value = min(max(value, _SMALLEST_SCALE), _LARGEST_SCALE)
             else:

@@ -2,7 +2,8 @@
 """Covariance of the attitude filter's errors, and its propagation and update, in arrays that are written in place.
 
 Errors are, in this order: attitude (rotation vector in b [rad], A_true = (I - [dtheta x]) A_estimated), gyro bias
-[rad/s], then for each cell what is calibrated (`cell_calibration`). A measurement is one number at a time: numbers
+[rad/s], then what else errs: slowly changing errors of the models (`slow_errors`), and for each cell what is
+calibrated (`cell_calibration`). A measurement is one number at a time: numbers
 whose errors are independent, taken in sequence with one linearisation, equal the stacked update, without a matrix
 inverse (Crassidis & Junkins, Optimal Estimation of Dynamic Systems, sections 3.3 and 6.2).
 """
@@ -15,7 +16,7 @@ from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, multiply
 from css_estimation.symmetric import Symmetric
 
-ATTITUDE, BIAS, CALIBRATION = 0, 3, 6
+ATTITUDE, BIAS, FURTHER = 0, 3, 6
 """Where each kind of error begins."""
 
 CORRECTION = 0
@@ -23,13 +24,20 @@ CORRECTION = 0
 _PRODUCT, _GAIN = 1, 2
 
 
+class Block(NamedTuple):
+    """Derivatives of one measured number to up to three errors that follow each other."""
+
+    first: int  # index of the first
+    errors: int  # how many, 0 to 3
+    slopes: Vec3
+
+
 class Partials(NamedTuple):
-    """Derivatives of one measured number: to the attitude error, and to the calibration errors of one cell."""
+    """Derivatives of one measured number: to the attitude error, and to two blocks of further errors."""
 
     attitude: Vec3
-    first: int  # index of the first calibration error; 0: none
-    errors: int  # calibration errors that follow from there, at most 3
-    calibration: Vec3
+    one: Block
+    other: Block
 
 
 def new_work(errors: int) -> np.ndarray:
@@ -95,25 +103,61 @@ def begin_update(work) -> None:
 
 
 @kernel
+def no_block() -> Block:
+    """No further errors."""
+    return Block(0, 0, (0.0, 0.0, 0.0))
+
+
+@kernel
+def attitude_partials(attitude: Vec3) -> Partials:
+    """Of a number in which nothing but the attitude errs."""
+    return Partials(attitude, no_block(), no_block())
+
+
+@kernel
+def product_at(covariance, i: int, h: Partials) -> float:
+    """Element `i` of P h: covariance of an error with the number that has the derivatives h."""
+    p = covariance
+    total = p[i, 0] * h.attitude[0] + p[i, 1] * h.attitude[1] + p[i, 2] * h.attitude[2]
+    for k in range(h.one.errors):
+        total += p[i, h.one.first + k] * h.one.slopes[k]
+    for k in range(h.other.errors):
+        total += p[i, h.other.first + k] * h.other.slopes[k]
+    return total
+
+
+@kernel
+def covariance_of(covariance, a: Partials, b: Partials) -> float:
+    """Covariance a^T P b of two numbers by the errors in both."""
+    total = 0.0
+    for k in range(3):
+        total += a.attitude[k] * product_at(covariance, ATTITUDE + k, b)
+    for k in range(a.one.errors):
+        total += a.one.slopes[k] * product_at(covariance, a.one.first + k, b)
+    for k in range(a.other.errors):
+        total += a.other.slopes[k] * product_at(covariance, a.other.first + k, b)
+    return total
+
+
+@kernel
 def innovate(covariance, work, h: Partials, residual: float, variance: float) -> tuple[float, float]:
     """Innovation of one number and its variance S; leaves g = P h in `work` for the update.
 
     Args:
         residual: measured less predicted with the state before any correction of this cycle.
     """
-    p, n = covariance, covariance.shape[0]
-    for i in range(n):
-        total = p[i, 0] * h.attitude[0] + p[i, 1] * h.attitude[1] + p[i, 2] * h.attitude[2]
-        for k in range(h.errors):
-            total += p[i, h.first + k] * h.calibration[k]
-        work[_PRODUCT, i] = total
+    for i in range(covariance.shape[0]):
+        work[_PRODUCT, i] = product_at(covariance, i, h)
     innovation, s = residual, variance
     for i in range(3):
         innovation -= h.attitude[i] * work[CORRECTION, i]
         s += h.attitude[i] * work[_PRODUCT, i]
-    for k in range(h.errors):
-        innovation -= h.calibration[k] * work[CORRECTION, h.first + k]
-        s += h.calibration[k] * work[_PRODUCT, h.first + k]
+    for k in range(h.one.errors):
+        innovation -= h.one.slopes[k] * work[CORRECTION, h.one.first + k]
+        s += h.one.slopes[k] * work[_PRODUCT, h.one.first + k]
+    for k in range(h.other.errors):
+        innovation -= h.other.slopes[k] * work[CORRECTION, h.other.first + k]
+        s += h.other.slopes[k] * work[_PRODUCT, h.other.first + k]
     return innovation, s
 
 
@@ -164,3 +208,44 @@ def set_block(covariance, first: int, block: Symmetric) -> None:
     p[first, first + 1] = p[first + 1, first] = block[1]
     p[first, first + 2] = p[first + 2, first] = block[2]
     p[first + 1, first + 2] = p[first + 2, first + 1] = block[4]
+
+
+@kernel
+def set_single(covariance, i: int, variance: float) -> None:
+    """One error has the variance, and nothing to do with the others."""
+    for j in range(covariance.shape[0]):
+        covariance[i, j] = covariance[j, i] = 0.0
+    covariance[i, i] = variance
+
+
+@kernel
+def fade(covariance, i: int, factor: float, variance: float) -> None:
+    """One error is multiplied by a factor, its correlations with it; then a variance of its own is added."""
+    for j in range(covariance.shape[0]):
+        covariance[i, j] *= factor
+        covariance[j, i] *= factor
+    covariance[i, i] += variance
+
+
+@kernel
+def mix(
+    covariance, i: int, j: int, forward: tuple[float, float, float, float], lasting_i: float, lasting_j: float
+) -> None:
+    """Two errors are carried on by a 2 x 2 matrix (row by row), with the noise that keeps their variances in the end.
+
+    Args:
+        lasting_i, lasting_j: the variances P that they tend to, uncorrelated: the noise is P - F P F^T.
+    """
+    p, (a, b, c, d) = covariance, forward
+    for k in range(p.shape[0]):
+        p[i, k], p[j, k] = a * p[i, k] + b * p[j, k], c * p[i, k] + d * p[j, k]
+    for k in range(p.shape[0]):
+        p[k, i], p[k, j] = a * p[k, i] + b * p[k, j], c * p[k, i] + d * p[k, j]
+    p[i, i] += lasting_i - (a * a * lasting_i + b * b * lasting_j)
+    p[j, j] += lasting_j - (c * c * lasting_i + d * d * lasting_j)
+    noise = -(a * c * lasting_i + b * d * lasting_j)
+    p[i, j] += noise
+    # symmetric to the last bit
+    p[j, i] = p[i, j]
+    for k in range(p.shape[0]):
+        p[k, i], p[k, j] = p[i, k], p[j, k]

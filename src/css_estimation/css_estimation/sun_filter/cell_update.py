@@ -22,7 +22,8 @@ from typing import NamedTuple
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, add, cross, dot, matmul, multiply, multiply_transposed, norm, scale
-from css_environment.albedo_gradient import albedo_gradient
+from css_environment.albedo import albedo_output
+from css_environment.albedo_slope import albedo_slopes
 from css_estimation.sun_filter.memory import (
     COMMON,
     EARTH,
@@ -34,10 +35,12 @@ from css_estimation.sun_filter.memory import (
     X_GAIN,
     X_RATE,
     X_SCALE,
+    SunFilterMemory,
     dcm_of,
     forget,
     quadratic,
     set_dcm,
+    triple,
 )
 from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.response import respond
@@ -110,8 +113,7 @@ def read_cells(
     states: int,
     x,
     covariance,
-    earth,
-    work,
+    m: SunFilterMemory,
 ) -> CellReading:
     """Updates an estimate with all cells.
 
@@ -120,17 +122,18 @@ def read_cells(
         more_noise: variance of each cell [-] beside that of its noise.
         earth_known: `light` is that of the Earth; else it is unknown.
         states: how many of the states are in use.
-        earth, work: room, of `SunFilterMemory`.
+        m: room.
     """
     dcm_bn = dcm_of(x)
     cells = voltages.shape[0]
     if earth_known:
-        albedo_gradient(light, p.cells, p.screen, p.cos_half_view, dcm_bn, earth)
+        albedo_output(light, p.cells, p.screen, p.cos_half_view, dcm_bn, m.earth_work, m.earth)
+        albedo_slopes(light, p.cells, p.screen, p.cos_half_view, dcm_bn, m.earth_slopes)
     sun_b = multiply(dcm_bn, sun_n)
     sigma = heading_sigma(covariance, sun_n)
     margin = min(_MARGIN_LEAST + _MARGIN_BY_SIGMA * sigma, _MARGIN_MOST)
     forget(covariance, COMMON, 1, p.errors.common)
-    gained, correction = work[0], work[1]
+    gained, correction = m.work[0], m.work[1]
     for j in range(states):
         correction[j] = 0.0
     scale_now = p.response.scale * (1.0 + x[X_SCALE])
@@ -146,7 +149,7 @@ def read_cells(
         cell = p.cells[i]
         v -= cell.dark
         cosine, seen, doubtful = view_of(p, i, sun_b, margin)
-        mean_light = earth[i, 0] if earth_known else 0.0
+        mean_light = m.earth[i] if earth_known else 0.0
         albedo = earth_factor * mean_light if earth_known else 0.5 * p.earth.unknown
         if doubtful:
             # the reading tells on which side of the edge the Sun is, where no Earth could
@@ -167,14 +170,14 @@ def read_cells(
         if not earth_known and not seen and v < p.earth.largest * flux:
             continue
         slope *= factor * scale_now
-        toward_n = (0.0, 0.0, 0.0)
-        if earth_known:
-            toward_n = (earth_factor * earth[i, 1], earth_factor * earth[i, 2], earth_factor * earth[i, 3])
+        # normals in n turn with the error, d(n) = theta x n; slopes are those of a turn theta seen in b
+        by_theta = (0.0, 0.0, 0.0)
         if seen:
-            toward_n = add(toward_n, scale(flux, sun_n))
-        normal_n = multiply_transposed(dcm_bn, (cell.nx, cell.ny, cell.nz))
-        # the normal in n turns with the error: d(n) = theta x n
-        by_theta = scale(slope, cross(normal_n, toward_n))
+            normal_n = multiply_transposed(dcm_bn, (cell.nx, cell.ny, cell.nz))
+            by_theta = scale(slope * flux, cross(normal_n, sun_n))
+        if earth_known:
+            by_earth_n = multiply_transposed(dcm_bn, triple(m.earth_slopes[i], 0))
+            by_theta = add(by_theta, scale(slope * earth_factor, by_earth_n))
         by_scale = factor * p.response.scale * output
         by_earth = slope * mean_light
         by_gain = cell.gain * scale_now * output

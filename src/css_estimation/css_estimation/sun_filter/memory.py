@@ -21,6 +21,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3
+from css_environment.albedo import new_workspace
 
 THETA, RATE, SCALE, COMMON, EARTH, GAIN = 0, 3, 6, 7, 8, 9
 
@@ -44,7 +45,9 @@ class SunFilterMemory(NamedTuple):
     covariances: np.ndarray  # (HYPOTHESES, 9 + 2 N, 9 + 2 N)
     weights: np.ndarray  # (HYPOTHESES,) logarithms, DEAD for those that are not followed
     grid: np.ndarray  # (DIRECTIONS,) logarithms of the weights of directions to the Sun
-    earth: np.ndarray  # (N, 4) of `css_environment.albedo_gradient`
+    earth: np.ndarray  # (N,) light of the Earth on each cell [-]
+    earth_slopes: np.ndarray  # (N, 3) its derivatives to a turn of the body [1/rad]
+    earth_work: np.ndarray  # (224,) of `css_environment.albedo.new_workspace`
     work: np.ndarray  # (3, 9 + 2 N)
 
 
@@ -58,7 +61,9 @@ def new_memory(cells: int) -> SunFilterMemory:
         np.zeros((HYPOTHESES, states, states)),
         np.full(HYPOTHESES, DEAD),
         np.zeros(DIRECTIONS),
-        np.zeros((cells, 4)),
+        np.zeros(cells),
+        np.zeros((cells, 3)),
+        new_workspace(),
         np.zeros((3, states)),
     )
 

@@ -368,8 +368,7 @@ def _track(
                 states,
                 x,
                 covariance,
-                memory.earth,
-                memory.work,
+                memory,
             )
             weigh(memory, k, read.likelihood)
             if k == best:

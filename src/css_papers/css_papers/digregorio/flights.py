@@ -15,6 +15,8 @@ from css_monte_carlo.mission_flight import MissionFlight
 MISSION = "cubesat_vmm"
 VECTOR, VOLTAGE = "attitude_vector", "attitude_voltage"
 FILTERS = {VECTOR: "vector", VOLTAGE: "voltage"}
+AS_IN_PAPER = tuple(f"{name}.{key}" for name in FILTERS for key in ("error_model=white", "albedo.compensate=false"))
+"""The filters of the slides: all errors are white noise, and the Earth does not shine."""
 GUESS_DEG = 20.0
 """Error of the attitude that filters begin with, about each axis, 1 sigma."""
 DIVERGED_DEG = 10.0
@@ -65,8 +67,8 @@ def fly(
     overrides: tuple[str, ...] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Flown:
-    """Flies both filters on the same data, from the same guess."""
-    flown = mission.with_overrides([DIODES[diodes], *overrides])
+    """Flies both filters of the slides on the same data, from the same guess."""
+    flown = mission.with_overrides([DIODES[diodes], *AS_IN_PAPER, *overrides])
     period_s = mission.period_ns * 1e-9
     flights = [MissionFlight(flown, name) for name in FILTERS]
     tallies = dict(zip(FILTERS, fly_in_threads(flights, cases, guess_deg=GUESS_DEG, progress=progress), strict=True))
