@@ -9,15 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.declared import built, given, made, table_of
-from css_common.epochs import parse_utc
-from css_common.kernel import typed_call
-from css_common.schema import Values, choice, flag, integer, real, reals
+from css_common.declared import built, given, made, part, table_of
+from css_common.schema import Values, flag, integer, reals
 from css_common.vectors import Vec3, add, vector_of
-from css_environment.earth_light import albedo_sources, new_earth_view, new_light
 from css_environment.magnetic_field import HIGHEST_DEGREE
 from css_environment.mission_environment import MissionEnvironment
-from css_environment.reflectivity import named_reflectivity
+from css_estimation.mean_earth import MeanEarth, PredictedLight
 
 FIELD_DEGREE = integer(
     "reference.field_degree", HIGHEST_DEGREE, "-", "highest degree of the field model", low=1, high=HIGHEST_DEGREE
@@ -40,16 +37,7 @@ class ReferenceParameters(NamedTuple):
         reals("reference.field_offset_nt", (0.0, 0.0, 0.0), "nT", "error put on the field model, in n", length=3),
     )
     compensate: bool = given(COMPENSATE)
-    reflectivity: str = given(
-        choice(
-            "albedo.reflectivity",
-            "zonal",
-            ("zonal", "knocke", "constant"),
-            "the Earth of the prediction: annual means by latitude, seasonal model by latitude, one value",
-        )
-    )
-    constant: float = given(real("albedo.constant", 0.3, "-", "the one value", low=0.0, high=1.0))
-    factor: float = given(real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0))
+    earth: MeanEarth = part(MeanEarth)
 
 
 PARAMETERS = table_of(ReferenceParameters)
@@ -77,16 +65,13 @@ class FlightReferences:
         self._environment = MissionEnvironment(values, field=True, field_degree=p.field_degree)
         self._offset_n = p.field_offset_n
         self._compensate = p.compensate
-        grid = named_reflectivity(p.reflectivity, p.constant, parse_utc(values.mission.epoch))
-        self._reflectivity = np.minimum(p.factor * grid.mean, 1.0)
-        self.light = new_light()
-        self._view = new_earth_view()
-        self._sources = typed_call(albedo_sources)
+        self._predicted = PredictedLight(values)
+        self.light = self._predicted.light
 
     def at(self, elapsed_s: float) -> References:
         """References at an instant [s after the epoch]; `light` is renewed."""
         e = self._environment.at(elapsed_s)
         sunlit = e.illumination > _FULL_DISC
         if self._compensate and sunlit:
-            self._sources(self._view, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, self._reflectivity, self.light)
+            self._predicted.at(e)
         return References(e.sun_n, e.solar_flux * e.illumination, sunlit, add(e.field_n, self._offset_n))

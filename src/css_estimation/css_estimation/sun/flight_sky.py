@@ -6,15 +6,11 @@ The Earth is the filter's own: a mean reflectivity without the clouds of the day
 
 from typing import NamedTuple
 
-import numpy as np
-
-from css_common.declared import built, given, table_of
+from css_common.declared import given, part, table_of
 from css_common.epochs import parse_utc
-from css_common.kernel import typed_call
-from css_common.schema import Values, choice, flag, real
-from css_environment.earth_light import albedo_sources, new_earth_view, new_light
+from css_common.schema import Values, flag
 from css_environment.mission_environment import MissionEnvironment
-from css_environment.reflectivity import named_reflectivity
+from css_estimation.mean_earth import MeanEarth, PredictedLight
 from css_estimation.sun.sun_heading import PREDICTION_ECLIPSED, PREDICTION_SUNLIT, UNKNOWN_SKY, Sky
 
 USE_ORBIT = flag("use_orbit", True, "use the place in orbit, where the mission has one: shadow and light of the Earth")
@@ -27,16 +23,7 @@ class SkyParameters(NamedTuple):
     """Of the flight's own models."""
 
     use_orbit: bool = given(USE_ORBIT)
-    reflectivity: str = given(
-        choice(
-            "albedo.reflectivity",
-            "zonal",
-            ("zonal", "knocke", "constant"),
-            "the Earth of the prediction: annual means by latitude, seasonal model by latitude, one value",
-        )
-    )
-    constant: float = given(real("albedo.constant", 0.3, "-", "the one value", low=0.0, high=1.0))
-    factor: float = given(real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0))
+    earth: MeanEarth = part(MeanEarth)
 
 
 PARAMETERS = table_of(SkyParameters)
@@ -53,25 +40,19 @@ class FlightSky:
         """Takes sections mission and orbit.
 
         Args:
-            with_light: predict the light of the Earth, with `PARAMETERS`.
+            with_light: predict the light of the Earth, by the parameters of `MeanEarth`.
         """
         self._environment = MissionEnvironment(values, field=False)
         self._epoch_ns = parse_utc(values.mission.epoch)
-        self._light = new_light()
         self.has_light = with_light
-        self._reflectivity: np.ndarray | None = None
-        if with_light:
-            p = built(SkyParameters, values)
-            grid = named_reflectivity(p.reflectivity, p.constant, self._epoch_ns)
-            self._reflectivity = np.minimum(p.factor * grid.mean, 1.0)
-            self._view = new_earth_view()
-            self._sources = typed_call(albedo_sources)
+        self._predicted = PredictedLight(values) if with_light else None
+        self._light = UNKNOWN_SKY.light if self._predicted is None else self._predicted.light
 
     def at(self, stamp_ns: int) -> Sky:
         """What the models say at a stamp [ns of UTC]; the table of light is the same one each time, written anew."""
         e = self._environment.at((stamp_ns - self._epoch_ns) * 1e-9)
-        if self._reflectivity is not None and e.illumination > 0.0:
-            self._sources(self._view, e.r_n, e.sun_n, e.solar_flux, e.dcm_en, self._reflectivity, self._light)
+        if self._predicted is not None and e.illumination > 0.0:
+            self._predicted.at(e)
         predicted = PREDICTION_ECLIPSED if e.illumination < _HALF else PREDICTION_SUNLIT
         return Sky(True, predicted, e.sun_n, e.solar_flux, e.illumination, self._light)
 

@@ -40,8 +40,8 @@ _ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
 _ROLL_VARIANCE = 0.2**2
 _HEADING_VARIANCE = 0.05**2
 _SEARCH_VARIANCE = 0.1**2
-# Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: its variance
-# is kept above one that falls within this time [s] ...
+# Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: the
+# variance is kept above one that falls within this time [s] ...
 _SETTLING = 60.0
 # ... and both go on to grow, by what clouds do that last, and what a wrong turn made of the Earth's light [rad2/s].
 _ROLL_NOISE, _HEADING_NOISE = 1e-5, 1e-7
