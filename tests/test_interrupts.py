@@ -48,10 +48,11 @@ def test_processes_end_with_their_flight(tmp_path):
     assert result.interrupted
     assert not result.failure
     (supervisor,) = supervisors
-    assert [child.poll() for child in (*supervisor.children.values(), supervisor.recorder)] == [0] * 6
+    children = (*supervisor.children.values(), supervisor.recorder)
+    assert [child.poll() for child in children] == [0] * 6, [child.log_tail() for child in children if child.poll()]
     # time held at the last stamp until all had answered it
     assert result.steps > 0
-    assert result.messages_lost == 0
+    assert result.messages_lost == 0, result.notes
     recorded = messages_by_topic(bag)
     topics = result.mission.topics
     assert {topic: len(recorded[f"/{topic}"]) for topic in topics} == dict.fromkeys(topics, result.steps)
