@@ -100,6 +100,7 @@ _MOST = 4.0  # [rad2] reported variance
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
 
 PARAMETERS = options.PARAMETERS
+conflicts = options.conflicts
 _built = builder(SunFilterParameters)
 
 
