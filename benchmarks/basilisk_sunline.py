@@ -3,7 +3,7 @@
 
     ./sunpoint shell -c "python benchmarks/basilisk_sunline.py"
 
-Eight cells of cosine law with white noise, on a body whose rate wanders. Both sides begin with the same state and
+Eight cells of cosine law with white noise, on a body at a constant rate. Both sides begin with the same state and
 covariance, and have the same points, noises and threshold. For each pair and scene it prints the largest difference of
 states and of covariances with points used `alike`, and the mean errors of Basilisk, of the filter here with points used
 alike, and with points used as by `default`. README: what differs, and why.
@@ -13,6 +13,7 @@ import argparse
 import json
 import math
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -81,7 +82,7 @@ class Scene:
 
     def settings(self, name: str) -> dict[str, Any]:
         """What both filters of a pair begin with."""
-        started = (np.array(self.first) + (0.05, -0.1, 0.1)).tolist()
+        started = np.add(self.first, (0.05, -0.1, 0.1)).tolist()
         if name == "sunlineSuKF":
             started = (np.array(started) / np.linalg.norm(started)).tolist()
         rate = [0.0, 0.0, 1.0] if name == "sunlineSuKF" else [0.0, 0.0, 0.0]
@@ -96,7 +97,7 @@ class Scene:
         }  # fmt: skip
 
 
-def compared(basilisk: Basilisk, name: str, scene: Scene):
+def compared(basilisk: Basilisk, name: str, scene: Scene) -> Iterator[str]:
     """A line for each filter."""
     sequence = {
         "normals": scene.normals.tolist(),
@@ -134,7 +135,7 @@ def followed(algorithm, scene: Scene, settings: dict[str, Any], *, alike: bool) 
     return np.array(states), np.array(covariances)
 
 
-def parameters(algorithm, scene: Scene, settings: dict[str, Any], alike: bool):
+def parameters(algorithm, scene: Scene, settings: dict[str, Any], alike: bool) -> Any:
     """The settings in this project's terms: noises for a second."""
     share = 1.0 / math.sqrt(PERIOD)
     light = {"light_process_sigma": LIGHT_NOISE * share} if algorithm is sunline_suekf else {}
@@ -169,7 +170,8 @@ def errors_of(peer: str, scene: Scene, x: np.ndarray) -> tuple[float, float]:
     else:
         # which of its axes a filter uses its state does not say
         rate_error = np.abs(np.linalg.norm(x[:, 3:5], axis=1) - np.linalg.norm(across, axis=1))
-    heading = [angle_between(tuple(a), tuple(b)) for a, b in zip(d[SETTLED:].tolist(), scene.sun[SETTLED:].tolist(), strict=True)]
+    pairs = zip(d[SETTLED:].tolist(), scene.sun[SETTLED:].tolist(), strict=True)
+    heading = [angle_between(tuple(a), tuple(b)) for a, b in pairs]
     return math.degrees(np.mean(heading)), math.degrees(np.mean(rate_error[SETTLED:]))
 
 

@@ -3,12 +3,14 @@
 
     .cache/basilisk/bin/python -I benchmarks/basilisk_sunline_peer.py sequence.json
 
-Each module is called once a cycle with the message of that cycle. The last line is a JSON object: for each module the state and the covariance after every cycle.
+Each module is called once a cycle with the message of that cycle. The last line is a JSON object: for each module the
+state and the covariance after every cycle.
 """
 
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from Basilisk.architecture import messaging
@@ -29,7 +31,7 @@ def main() -> int:
     return 0
 
 
-def ukf(settings: dict):
+def ukf(settings: dict) -> Any:
     """Module with its initial state."""
     module = sunlineUKF.sunlineUKF()
     module.state = settings["x"]
@@ -37,7 +39,7 @@ def ukf(settings: dict):
     return tuned(module, settings)
 
 
-def sukf(settings: dict):
+def sukf(settings: dict) -> Any:
     """The same; its rates are those of the frame relative to the body."""
     module = sunlineSuKF.sunlineSuKF()
     x = np.array(settings["x"])
@@ -48,7 +50,7 @@ def sukf(settings: dict):
     return tuned(module, settings)
 
 
-def tuned(module, settings: dict):
+def tuned(module, settings: dict) -> Any:
     """What the two have in common."""
     module.alpha, module.beta, module.kappa = settings["alpha"], settings["beta"], settings["kappa"]
     module.qNoise = np.diag(settings["noise"]).ravel().tolist()

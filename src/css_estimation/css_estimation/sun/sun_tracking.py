@@ -133,13 +133,7 @@ def turned_sun(sun_b: Vec3, omega_bn_b: Vec3, dt: float) -> Vec3:
 @kernel
 def makes_pair(state: TrackingState, dt: float, gyro_ok: bool, estimate: Estimate) -> bool:
     """Whether the body rate follows from the last Sun vector and this one."""
-    return (
-        not gyro_ok
-        and estimate.valid
-        and not estimate.restarted
-        and state.validity == VALIDITY_VALID
-        and dt > 0.0
-    )
+    return not gyro_ok and estimate.valid and not estimate.restarted and state.validity == VALIDITY_VALID and dt > 0.0
 
 
 @kernel

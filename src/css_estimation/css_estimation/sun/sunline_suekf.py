@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Switch filter: Sun direction, the body rate across it, and the light (Teil, Schaub & Piggott 2020).
 
-After the documentation of Basilisk's `sunlineSuKF`, a square-root unscented filter whose states are those that cells can
-show. States: the direction d in b; the body rate omega_bn [rad/s] along s2 and s3 of the frame
+After the documentation of Basilisk's `sunlineSuKF`: a square-root unscented filter of the states that cells can show.
+States: the direction d in b; the body rate omega_bn [rad/s] along s2 and s3 of the frame
 
     s1 = d,  s2 = unit(d x b_k),  s3 = s1 x s2,
 
@@ -25,7 +25,7 @@ from css_common.conversions import square
 from css_common.declared import builder, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import real
-from css_common.vectors import Mat3, Vec3, add, cross, dot, norm, scale, unit
+from css_common.vectors import Vec3, add, cross, dot, norm, scale, unit
 from css_estimation.sun import unscented_cycle
 from css_estimation.sun.cell_layout import informs, missing_cells
 from css_estimation.sun.square_root import add_vector

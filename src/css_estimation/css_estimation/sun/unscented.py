@@ -43,15 +43,15 @@ class PointParameters(NamedTuple):
     spread: Spread = made(
         spread_of,
         real("points.alpha", 0.02, "-", "spread of the points", low=0.001, high=1.0),
-        real("points.beta", 2.0, "-", "weight of the middle one in covariances; 2 fits normal errors", high=10.0, low=0.0),
+        real(
+            "points.beta", 2.0, "-", "weight of the middle one in covariances; 2 fits normal errors", high=10.0, low=0.0
+        ),
         real("points.kappa", 0.0, "-", "second scale of the spread", low=0.0, high=10.0),
     )
     redraw: bool = given(
         flag("points.redraw", True, "draw points anew before an update, so that it knows the process noise")
     )
-    centre: bool = given(
-        flag("points.centre", False, "predict the moved estimate; off: the mean of the moved points")
-    )
+    centre: bool = given(flag("points.centre", False, "predict the moved estimate; off: the mean of the moved points"))
 
 
 class UnscentedMemory(NamedTuple):

@@ -121,8 +121,8 @@ class Outcome(NamedTuple):
     axis: int
     rate_b: Vec3  # [rad/s] across the Sun line
     nis: float
-    count: int
-    mask: int
+    cells: int  # that contributed
+    mask: int  # which
 
 
 def initial_state(p: object) -> UnscentedState:
@@ -216,11 +216,9 @@ def is_sound(p: UnscentedParameters, light: float, memory: UnscentedMemory) -> b
     Args:
         light: length of the Sun vector or output of a cell that faces the Sun, 1 for the normal Sun.
     """
+    largest = 3.0 * p.initial_variance * max(1.0, light * light)
     # NaNs compare false
-    return (
-        1.0 / _LIGHT_RANGE < light < _LIGHT_RANGE
-        and trace(direction_covariance(memory)) <= 3.0 * p.initial_variance * max(1.0, light * light)
-    )
+    return 1.0 / _LIGHT_RANGE < light < _LIGHT_RANGE and trace(direction_covariance(memory)) <= largest
 
 
 @kernel
@@ -277,12 +275,10 @@ def close_cycle(
         False,
         outcome.restarted,
         outcome.nis,
-        outcome.count,
+        outcome.cells,
         outcome.mask,
         _mode(cycle, outcome, tracking.validity),
     )
     shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, cycle.dt, cycle.largest, aiding.sky.predicted)
-    tracking, heading = finish_with_rate(
-        p.tracking, tracking, cycle.dt, aiding, cycle.gyro_ok, shadow, estimate, rate
-    )
+    tracking, heading = finish_with_rate(p.tracking, tracking, cycle.dt, aiding, cycle.gyro_ok, shadow, estimate, rate)
     return UnscentedState(outcome.started, outcome.axis, tracking), heading
