@@ -52,6 +52,7 @@ from css_estimation.sun.unscented_cycle import (
     reading_of,
     start,
     sure_rate,
+    turn_points,
 )
 
 _RATES = 2
@@ -140,16 +141,19 @@ def predict(
     """Moves the estimate on; gives whether it is not lost, and the axis from here on."""
     f, x = p.filter, memory.x
     axis = switch_axis(axis, memory)
+    draw_points(f.points, memory)
     if cycle.steered:
-        s2, s3 = rate_axes(unit(direction_of(memory)), axis)
+        turn_points(aiding.gyro_b, cycle.dt, memory)
+    else:
+        for i in range(POINTS):
+            move_point(memory.points[i], axis, cycle.dt)
+    q, r, light = f.process_noise * cycle.dt, f.rate_noise * cycle.dt, p.light_noise * cycle.dt
+    sound = gather_points(f.points, (q, q, q, r, r, light), memory) and _normalise(memory)
+    if cycle.steered:
+        s2, s3 = rate_axes(direction_of(memory), axis)
         x[3], x[4] = dot(aiding.gyro_b, s2), dot(aiding.gyro_b, s3)
         sure_rate(memory.root, _RATES, f.rate_noise)
-    draw_points(f.points, memory)
-    for i in range(POINTS):
-        move_point(memory.points[i], axis, cycle.dt)
-    q, r, light = f.process_noise * cycle.dt, f.rate_noise * cycle.dt, p.light_noise * cycle.dt
-    sound = gather_points(f.points, (q, q, q, r, r, light), memory)
-    return sound and _normalise(memory) and is_sound(f, x[_LIGHT], memory), axis
+    return sound and is_sound(f, x[_LIGHT], memory), axis
 
 
 @kernel

@@ -29,9 +29,11 @@ from css_estimation.sun.unscented_cycle import (
     reading_of,
     start,
     sure_rate,
+    turn_points,
 )
 
 _RATES = 3
+_NO_LENGTH = 1e-300
 
 
 class SunlineUkfParameters(NamedTuple):
@@ -72,21 +74,22 @@ def _rate(memory: UnscentedMemory) -> Vec3:
 @kernel
 def predict(p: UnscentedParameters, cycle: Cycle, aiding: Aiding, memory: UnscentedMemory) -> bool:
     """Moves the estimate on; False when it is lost."""
-    before = direction_of(memory)
-    if cycle.steered:
-        rate = cross(before, aiding.gyro_b)
-        for a in range(3):
-            memory.x[3 + a] = rate[a]
-        sure_rate(memory.root, _RATES, p.rate_noise)
+    length = norm(direction_of(memory))
     draw_points(p.points, memory)
-    for i in range(POINTS):
-        move_point(memory.points[i], cycle.dt)
+    if cycle.steered:
+        turn_points(aiding.gyro_b, cycle.dt, memory)
+    else:
+        for i in range(POINTS):
+            move_point(memory.points[i], cycle.dt)
     q, r = p.process_noise * cycle.dt, p.rate_noise * cycle.dt
     sound = gather_points(p.points, (q, q, q, r, r, r), memory)
     if not cycle.lit:
-        k = norm(before) / max(norm(direction_of(memory)), 1e-300)
+        k = length / max(norm(direction_of(memory)), _NO_LENGTH)
         for a in range(3):
             memory.x[a] *= k
+    if cycle.steered:
+        memory.x[3], memory.x[4], memory.x[5] = cross(direction_of(memory), aiding.gyro_b)
+        sure_rate(memory.root, _RATES, p.rate_noise)
     return sound and is_sound(p, norm(direction_of(memory)), memory)
 
 

@@ -14,11 +14,12 @@ Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 t
 import math
 from typing import NamedTuple
 
+from css_common.attitude import rotation_vector_to_dcm
 from css_common.conversions import square
 from css_common.declared import computed, given, made, part
 from css_common.kernel import kernel
 from css_common.schema import Values, real
-from css_common.vectors import Vec3, dot, unit
+from css_common.vectors import Vec3, dot, multiply, scale, unit
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout
 from css_estimation.sun.eclipse_detector import detect_eclipse
@@ -36,7 +37,7 @@ from css_estimation.sun.sun_tracking import (
     turned_sun,
 )
 from css_estimation.sun.sunline_filter import constrain
-from css_estimation.sun.unscented import STATES, PointParameters, UnscentedMemory
+from css_estimation.sun.unscented import POINTS, STATES, PointParameters, UnscentedMemory
 from css_estimation.sun.wavg import weighted_average
 from css_estimation.symmetric import Symmetric, row_major, trace
 
@@ -196,6 +197,15 @@ def direction_covariance(memory: UnscentedMemory) -> Symmetric:
     r = memory.root
     a, b, c = (r[0, 0], 0.0, 0.0), (r[1, 0], r[1, 1], 0.0), (r[2, 0], r[2, 1], r[2, 2])
     return dot(a, a), dot(a, b), dot(a, c), dot(b, b), dot(b, c), dot(c, c)
+
+
+@kernel
+def turn_points(omega_bn_b: Vec3, dt: float, memory: UnscentedMemory) -> None:
+    """Turns the direction of each point by a gyro's rate; the rest of it stays."""
+    dcm = rotation_vector_to_dcm(scale(dt, omega_bn_b))
+    for i in range(POINTS):
+        x = memory.points[i]
+        x[0], x[1], x[2] = multiply(dcm, (x[0], x[1], x[2]))
 
 
 @kernel
