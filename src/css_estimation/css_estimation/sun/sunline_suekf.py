@@ -41,6 +41,7 @@ from css_estimation.sun.unscented import (
     update,
 )
 from css_estimation.sun.unscented_cycle import (
+    DEFAULTS,
     Cycle,
     Outcome,
     UnscentedParameters,
@@ -74,7 +75,7 @@ class SunlineSuekfParameters(NamedTuple):
     )
 
 
-PARAMETERS = table_of(SunlineSuekfParameters)
+PARAMETERS = table_of(SunlineSuekfParameters, **DEFAULTS)
 parameters = builder(SunlineSuekfParameters)
 initial_state = unscented_cycle.initial_state
 heading_gain = unscented_cycle.heading_gain

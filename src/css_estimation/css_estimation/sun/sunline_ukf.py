@@ -18,6 +18,7 @@ from css_estimation.sun import unscented_cycle
 from css_estimation.sun.sun_heading import Aiding, SunHeading
 from css_estimation.sun.unscented import POINTS, UnscentedMemory, draw_points, gather_points, new_memory, update
 from css_estimation.sun.unscented_cycle import (
+    DEFAULTS,
     Cycle,
     Outcome,
     UnscentedParameters,
@@ -42,7 +43,7 @@ class SunlineUkfParameters(NamedTuple):
     filter: UnscentedParameters = part(UnscentedParameters)
 
 
-PARAMETERS = table_of(SunlineUkfParameters)
+PARAMETERS = table_of(SunlineUkfParameters, **DEFAULTS)
 parameters = builder(SunlineUkfParameters)
 initial_state = unscented_cycle.initial_state
 heading_gain = unscented_cycle.heading_gain

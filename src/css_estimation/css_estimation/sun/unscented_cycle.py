@@ -54,6 +54,9 @@ _LARGEST_READING = 2.0
 # A light shorter or longer by this factor than the normal Sun's is none.
 _LIGHT_RANGE = 10.0
 
+DEFAULTS = {"gate": 0.4, "minimum_output": 0.3}
+"""Other defaults than those of headings without memory: as `sunline_ekf`, for a filter can wait for light."""
+
 _DIRECTION_SIGMA = real(
     "process_sigma", 0.001, "rad/sqrt(s)", "drift of the Sun line, 1 sigma", low=0.0, high=10.0, tunable=True
 )
