@@ -151,7 +151,8 @@ def test_no_direction_is_without_a_frame():
 def test_prediction_is_a_turn_about_the_rate():
     """In the dark, without gyro, from the rate that the light left: exact, where a straight step errs."""
     filter = Filter(sunline_suekf, rate_process_sigma=1e-4)
-    omega, sun_b = (0.0, -0.03, 0.0), (0.6, 0.0, 0.8)
+    sun_b = SUN_B
+    omega = tuple((0.03 * np.cross(sun_b, (0.0, 0.6, 0.8))).tolist())
     for _ in range(600):
         sun_b = turned(sun_b, omega)
         filter.step(outputs(sun_b))
