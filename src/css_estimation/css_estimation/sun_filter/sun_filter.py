@@ -420,6 +420,12 @@ def _progress(
 
 
 @kernel
+def knows_earth(state: SunFilterState) -> bool:
+    """Whether the light of the Earth is part of the state, and with it the turn about the Sun line."""
+    return state.progress.stage == _STAGE_ROLL
+
+
+@kernel
 def step(
     p: SunFilterParameters,
     state: SunFilterState,
