@@ -60,7 +60,28 @@ def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any
     # Numba takes the folder that its configuration names while it makes the dispatcher, and reads the configuration
     # anew from its environment whenever a variable of it has changed.
     numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # made at run time
-    return numba.njit(**options)(function)
+    dispatcher = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
+        _forgive(dispatcher._cache)
+    return dispatcher
+
+
+def _forgive(cached: Any) -> None:
+    """Lets a cache be made anew that names a type which cannot be imported here.
+
+    Who calls a kernel with a type of its own, as tests do, leaves its name among what is cached of that kernel; numba
+    reads the names of all types whichever is asked for.
+    """
+    load = cached.load_overload
+
+    def load_overload(signature: Any, target: Any) -> Any:
+        try:
+            return load(signature, target)
+        except (ImportError, AttributeError):
+            cached.flush()
+            return None
+
+    cached.load_overload = load_overload
 
 
 class Kernel(Protocol[P, R]):
