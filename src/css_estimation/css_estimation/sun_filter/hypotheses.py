@@ -81,7 +81,7 @@ def begin(
     begin_rate(p.motion, model, (0.0, 0.0, 0.0), p.motion.start_rate, wheels_b, x, covariance)
     cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
-    forget(covariance, GAIN, cells, p.errors.gain + p.errors.tilt)
+    forget(covariance, GAIN, cells, p.errors.cell)
     follow_only(m, 0)
 
 
