@@ -100,6 +100,11 @@ def _inverse_inertia(values: Values) -> Mat3:
     return mat3(np.linalg.inv(np.array(_inertia(values))))
 
 
+def _lasting(gain: float, tilt_deg: float) -> float:
+    """Variance of a cell's output relative to its own, by gain and by a tilt where that matters most, at 60 deg."""
+    return gain**2 + (math.tan(math.radians(60.0)) * math.radians(tilt_deg)) ** 2
+
+
 class Response(NamedTuple):
     """Output of a cell over the light that it receives."""
 
@@ -123,11 +128,9 @@ class CellErrors(NamedTuple):
         real("scale_sigma", 0.02, "-", "slow error of the output common to all cells, 1 sigma", low=0.0, high=1.0),
     )
     scale_time: float = given(real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9))
-    gain: float = made(
-        square, real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", low=0.0, high=1.0)
-    )
-    tilt: float = made(
-        lambda degrees: math.radians(degrees) ** 2,
+    cell: float = made(
+        _lasting,
+        real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", low=0.0, high=1.0),
         real(
             "tilt_sigma_deg",
             0.1,
@@ -136,6 +139,16 @@ class CellErrors(NamedTuple):
             low=0.0,
             high=45.0,
         ),
+    )
+    cell_time: float = given(
+        real(
+            "tilt_time",
+            600.0,
+            "s",
+            "time in which the Sun moves so far over a cell that its tilt makes another error",
+            low=1.0,
+            high=1e9,
+        )
     )
 
 
