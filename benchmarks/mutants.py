@@ -21,7 +21,6 @@ import difflib
 import json
 import os
 import random
-import re
 import resource
 import shutil
 import signal
@@ -181,28 +180,26 @@ class Trial:
             [*command, *(f"--deselect={test}" for test in sorted(broken)), *names],
             cwd=self._copy,
             env=self._environment(progress),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
             start_new_session=True,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 3)),
         )
         try:
             # a test that waits and uses no processor time is ended by pytest's own limit
-            said, _ = process.communicate()
+            process.wait()
         finally:
             _end(process)
             self._forget_kernels()
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        test = json.loads(progress.read_text()) if progress.exists() else {"test": "", "cpu_s": 0.0}
+        noted = {"test": "", "cpu_s": 0.0} | (json.loads(progress.read_text()) if progress.exists() else {})
         if process.returncode in (0, 5):  # all passed, or there was none
             return SURVIVED, "", used
         if process.returncode < 0:  # it ran out of processor time, or fell over
-            slow = -process.returncode == signal.SIGXCPU and used - test["cpu_s"] < TEST_LIMIT
-            return (OPEN if slow else KILLED), test["test"], used
-        failed = re.search(r"^(?:FAILED|ERROR) (\S+(?: [^-\s]\S*)*)", said, re.MULTILINE)
-        return KILLED, failed.group(1) if failed else test["test"], used
+            slow = -process.returncode == signal.SIGXCPU and used - noted["cpu_s"] < TEST_LIMIT
+            return (OPEN if slow else KILLED), noted["test"], used
+        return KILLED, noted.get("failed", noted["test"]), used
 
     def _environment(self, progress: Path) -> dict[str, str]:
         packages = [str(place) for place in sorted((self._copy / "src").iterdir()) if place.name != "css_msgs"]
