@@ -12,7 +12,7 @@ import pytest
 from listing import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
-from mutants import draw
+from mutants import draw, recall
 from mutations import mutations
 from relevant_tests import Sources
 
@@ -76,6 +76,12 @@ def test_the_draw_is_even_over_packages_and_the_beginning_of_a_longer_one():
     counts = Counter(name.split("/")[1] for name in names)
     assert set(counts) == {path.parent.name for path in ROOT.glob("src/*/setup.py")}
     assert max(counts.values()) - min(counts.values()) <= 1
+
+
+def test_mutants_are_found_again_by_their_names():
+    names = [mutant.name for mutant in draw(ROOT, 1, 30)]
+    gone = ["src/css_sim/css_sim/gyro.py: no such line -> pass", "src/css_sim/css_sim/no_such_file.py: a -> pass"]
+    assert sorted(mutant.name for mutant in recall(ROOT, [*names, *gone])) == sorted(names)
 
 
 def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sources):

@@ -10,7 +10,7 @@ from css_analysis.spin_consistency import attitude_cases, attitude_error
 from css_analysis.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure
 from css_common.mission import load_mission
 from css_papers.esprit.flights import attitude_errors, legs_of
-from css_papers.esprit.numbers import alias_rows, angle_rows, fixed_axis_row, rate_rows, true_max_min
+from css_papers.esprit.numbers import alias_rows, angle_rows, fixed_axis_row, period_rows, rate_rows, true_max_min
 from css_papers.esprit.spinning import fly_spinning
 from css_papers.papers import find_paper
 
@@ -46,6 +46,14 @@ def test_rows_of_a_flight_are_what_they_must_be(flight):
     assert [row.quantity for row in rows if not row.ok] == []
     note = next(row.note for row in rows if "maxima" in row.quantity)
     assert "come from one sample a turn" in note and "from motion during a passage" in note
+
+
+def test_periods_are_those_that_flew(flight):
+    legs, flown = legs_of(flight), float(flight.mission.values.payload.coning_period[-1])
+    rows = period_rows(legs, legs)
+    assert [row.variant for row in rows] == ["", "", "drift", "drift"]
+    for row, leg in zip(rows, [*legs, *legs], strict=True):
+        assert row.here == pytest.approx(flown, abs=leg.resolution), row.quantity
 
 
 def test_the_coning_node_says_what_the_page_says(flight):
