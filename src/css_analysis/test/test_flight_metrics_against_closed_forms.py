@@ -45,6 +45,8 @@ def test_all_quantities_of_a_known_flight():
         "power_positive_s": pytest.approx(120.0),
         "heading_error_mean_deg": pytest.approx(3.0),
         "heading_error_p95_deg": pytest.approx(3.0),
+        "heading_error_eclipse_deg": pytest.approx(3.0),
+        "heading_error_dawn_deg": pytest.approx(3.0),
         "attitude_error_mean_deg": None,
         "attitude_error_p95_deg": None,
         "attitude_nees": None,
@@ -206,13 +208,30 @@ def test_nees_of_drawn_errors_is_chi_square_of_two():
     assert abs(np.mean(nees > 5.991) - 0.05) < 4.0 * np.sqrt(0.05 * 0.95 / n)
 
 
+def test_headings_in_eclipse_and_at_dawn_are_told_apart():
+    """Errors of 2 deg in sunlight, 8 in eclipse, 5 in the first minute after it."""
+    pointing = np.full(steps(300.0), 10.0)
+    lit = np.concatenate([np.full(steps(100.0), 1.0), np.full(steps(80.0), 0.2), np.full(steps(120.0), 1.0)])
+    error = np.full(len(lit), 2.0)
+    error[steps(100.0) : steps(180.0)] = 8.0
+    error[steps(180.0) : steps(240.0)] = 5.0
+    (run,) = estimator_runs(flight(pointing, lit, ekf=estimates(tilted(pointing + error))))
+    assert run["heading_error_eclipse_deg"] == pytest.approx(8.0)
+    assert run["heading_error_dawn_deg"] == pytest.approx(5.0)
+    assert run["heading_error_sunlit_deg"] == pytest.approx((160.0 * 2.0 + 60.0 * 5.0) / 220.0)
+    (run,) = estimator_runs(
+        flight(pointing[: steps(90.0)], lit[: steps(90.0)], ekf=estimates(tilted(pointing + error)[: steps(90.0)]))
+    )
+    assert run["heading_error_eclipse_deg"] is None and run["heading_error_dawn_deg"] is None
+
+
 def test_runs_are_valid_json_and_a_plain_table():
     log = slewing_flight()
     log.estimates["none"] = estimates(np.zeros((len(log.truth), 3)), validity=0)
     runs = estimator_runs(log)
     assert json.loads(json.dumps(runs, allow_nan=False)) == runs
     out = io.StringIO()
-    Console(file=out).print(summary_table(runs, "a flight"))
+    Console(file=out, width=100).print(summary_table(runs, "a flight"))
     text = out.getvalue()
     assert "\x1b" not in text
     row = next(line for line in text.splitlines() if "ekf" in line)

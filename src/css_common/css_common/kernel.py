@@ -12,6 +12,7 @@ that it can be made from, and of the versions that compile it: edit one, and wha
 """
 
 import os
+import shutil
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
@@ -60,7 +61,28 @@ def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any
     # Numba takes the folder that its configuration names while it makes the dispatcher, and reads the configuration
     # anew from its environment whenever a variable of it has changed.
     numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # made at run time
-    return numba.njit(**options)(function)
+    dispatcher: Any = numba.njit(**options)(function)
+    if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
+        _forgive(dispatcher)
+    return dispatcher
+
+
+def _forgive(dispatcher: Any) -> None:
+    """Lets the cache be made anew that names a type which cannot be imported here.
+
+    Who calls a kernel with a type of its own, as tests do, leaves its name among what is cached of that kernel; numba
+    reads the names of all types whichever is asked for.
+    """
+    compile_types = dispatcher.compile
+
+    def compile_anew(signature: Any) -> Any:
+        try:
+            return compile_types(signature)
+        except (ImportError, AttributeError):
+            shutil.rmtree(dispatcher.stats.cache_path, ignore_errors=True)
+            return compile_types(signature)
+
+    dispatcher.compile = compile_anew
 
 
 class Kernel(Protocol[P, R]):

@@ -122,6 +122,24 @@ def test_only_what_a_kernel_is_made_from_names_its_folder(project):
     assert project.run() == before | {"hits": 1}
 
 
+def test_a_cache_that_names_a_type_which_is_gone_is_made_anew(project):
+    """Tests hand kernels types of their own; whoever flies afterwards cannot import those."""
+    (project.root / "visitor.py").write_text("from typing import NamedTuple\nclass Pair(NamedTuple):\n    x: float\n")
+    (project.root / "css_sim" / "outer.py").write_text(
+        "from numba.extending import overload\nfrom css_common.kernel import kernel\n"
+        "from css_environment.inner import inner\n"
+        "def value(x):\n    return x\n"
+        "@overload(value)\ndef _value(x):\n"
+        "    return (lambda x: x.x) if hasattr(x, 'instance_class') else (lambda x: x)\n"
+        "@kernel\ndef outer(x):\n    return 10.0 * inner(value(x))\n"
+    )
+    before = project.run("from visitor import Pair\nfrom css_sim.outer import outer\nouter(Pair(2.0))")
+    assert before["result"] == 20.0
+    (project.root / "visitor.py").unlink()
+    assert project.run() == before | {"hits": 0}
+    assert project.run() == before | {"hits": 1}
+
+
 def test_edit_two_imports_away_counts(project):
     (project.root / "css_sim" / "constants.py").write_text("TERM = 1.0\n")
     inner = project.root / "css_environment" / "inner.py"

@@ -8,6 +8,7 @@ that knows only latitude has one column, one that is constant a single cell.
 
 import csv
 import math
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -115,6 +116,40 @@ def draw_reflectivity(reflectivity: Reflectivity, key: RandomKey, common: bool, 
         draw = common_draw if common else draws[cell % 4]
         i, j = cell // columns, cell % columns
         values_out[i, j] = min(HIGHEST, max(LOWEST, reflectivity.mean[i, j] + reflectivity.std[i, j] * draw))
+
+
+@kernel
+def _draws_of_cells(key: RandomKey, out) -> None:
+    """(N,) independent normal draws, those of `draw_reflectivity`."""
+    for cell in range(out.shape[0]):
+        out[cell] = normal4(key, Stream.ALBEDO, 1, cell // 4)[cell % 4]
+
+
+def draw_correlated(reflectivity: Reflectivity, key: RandomKey, length: float) -> np.ndarray:
+    """As `draw_reflectivity` draws each cell, with draws alike over an angle: (rows, columns).
+
+    Draws of two cells an angle a apart have the correlation exp(-a^2 / (2 length^2)).
+
+    Args:
+        length: [rad] at the centre of the Earth.
+    """
+    rows, columns = reflectivity.mean.shape
+    draws = np.zeros(rows * columns)
+    _draws_of_cells(key, draws)
+    field = (_smoothing(rows, columns, length) @ draws).reshape(rows, columns)
+    return np.clip(reflectivity.mean + reflectivity.std * field, LOWEST, HIGHEST)
+
+
+@lru_cache(maxsize=2)
+def _smoothing(rows: int, columns: int, length: float) -> np.ndarray:
+    """(cells, cells) weights of independent draws, of unit norm for each cell: equal areas count equally."""
+    latitude = np.pi * ((np.arange(rows) + 0.5) / rows - 0.5)
+    longitude = 2.0 * np.pi * ((np.arange(columns) + 0.5) / columns - 0.5)
+    lat, lon = (a.ravel() for a in np.meshgrid(latitude, longitude, indexing="ij"))
+    directions = np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+    angle = np.arccos(np.clip(directions @ directions.T, -1.0, 1.0))
+    weights = np.sqrt(np.cos(lat)) * np.exp(-((angle / length) ** 2))
+    return weights / np.linalg.norm(weights, axis=1, keepdims=True)
 
 
 @kernel

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from css_common.random_streams import random_key
 from css_environment.reflectivity import (
+    Reflectivity,
     cell_at,
     constant_reflectivity,
+    draw_correlated,
     draw_reflectivity,
     knocke_reflectivity,
     read_reflectivity,
@@ -131,3 +133,25 @@ def test_without_deviations_a_draw_is_the_mean():
     drawn = np.empty((1, 1))
     draw_reflectivity(grid, random_key(1, 1), False, drawn)
     assert drawn[0, 0] == 0.3
+
+
+def test_correlated_draws_have_the_correlation_and_the_statistics_of_cells():
+    """Over 400 cases: unit variance everywhere, and exp(-a^2 / (2 L^2)) between cells an angle a apart."""
+    length = np.radians(20.0)
+    grid = Reflectivity(np.full((36, 72), 0.5), np.full((36, 72), 0.05))
+    draws = np.array([draw_correlated(grid, random_key(1, case), length) for case in range(400)])
+    field = (draws - 0.5) / 0.05
+    assert np.abs(field.mean()) < 0.05
+    assert field.std(axis=0) == pytest.approx(1.0, abs=0.2)
+    # along the row nearest to the equator, 5 deg from cell to cell, and down a column
+    for steps in (1, 4, 8):
+        expected = np.exp(-0.5 * (np.radians(5.0 * steps) / length) ** 2)
+        along = np.mean(field[:, 18] * np.roll(field[:, 18], steps, axis=1))
+        down = np.mean(field[:, 10] * field[:, 10 + steps])
+        assert along == pytest.approx(expected, abs=0.08) and down == pytest.approx(expected, abs=0.08)
+
+
+def test_a_case_has_the_same_correlated_earth_again():
+    grid = zonal_reflectivity()
+    first, again, other = (draw_correlated(grid, random_key(1, case), 0.3) for case in (4, 4, 5))
+    assert np.array_equal(first, again) and not np.array_equal(first, other)

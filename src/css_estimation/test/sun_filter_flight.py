@@ -26,11 +26,14 @@ def outputs_of(p, sun_b):
 
 
 class SunFilterFlight:
-    """Cells of a layout on a body; `step` flies one cycle and gives the heading."""
+    """Cells of a layout on a body; `step` flies one cycle and gives what the algorithm makes of it."""
+
+    algorithm = sun_filter
 
     def __init__(self, sun_b=(0.0, 0.6, 0.8), omega=(0.0, 0.0, 0.0), seed=1, white=0.0, earth=None, **changes):
-        self.p = sun_filter.parameters(okeefe_values(SunFilter.table(), **changes))
-        self.state, self.memory = sun_filter.initial_state(self.p), sun_filter.initial_memory(self.p)
+        self.p = self.algorithm.parameters(okeefe_values(SunFilter.table(), **changes))
+        self.state = self.algorithm.initial_state(self.p)
+        self.memory = self.algorithm.initial_memory(self.p)
         self.sun_n = unit((1.0, 0.0, 0.0))
         self.dcm_bn = _onto(unit(sun_b), self.sun_n)
         self.momentum_n = multiply(_transposed(self.dcm_bn), multiply(self.p.motion.inertia, omega))
@@ -83,15 +86,15 @@ class SunFilterFlight:
             wheels_valid=wheels,
             sky=self.sky._replace(illumination=part),
         )
-        self.state, heading = sun_filter.step(self.p, self.state, self.memory, DT, voltages, aiding)
-        return heading
+        self.state, result = self.algorithm.step(self.p, self.state, self.memory, DT, voltages, aiding)
+        return result
 
     def fly(self, seconds, **conditions):
-        """The last heading after some seconds."""
-        heading = None
+        """The last result after some seconds."""
+        result = None
         for _ in range(round(seconds / DT)):
-            heading = self.step(**conditions)
-        return heading
+            result = self.step(**conditions)
+        return result
 
     def error_deg(self, heading):
         """Error of a heading."""

@@ -10,7 +10,8 @@ from css_monte_carlo.commands.monte_carlo import main
 SHORT = ["okeefe_2013", "--duration", "30", "--set", "mission.period=1.0", "--cases", "3"]
 
 
-def test_json_on_the_last_line(tmp_path, capsys):
+def test_json_on_the_last_line(tmp_path, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
     folder = tmp_path / "s"
     arguments = ["--estimators", "ekf", "wavg", "--gyro", "on", "off", "--sweep", "css_array.noise=0,0.1"]
     assert main([*SHORT, *arguments, "--out", str(folder), "--json"]) == 0

@@ -40,5 +40,5 @@ def test_a_short_flight_gives_a_page(tmp_path, monkeypatch):
     assert by_name["short: heading error", "no gyro"].here < 5.0
     # no eclipse within five minutes: what was not measured does not meet what it must
     assert by_name["short: in eclipse", "gyro"].here is None and not by_name["short: in eclipse", "gyro"].ok
-    text = (tmp_path / "index.md").read_text(encoding="utf-8")
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
     assert "the paper's, no gyro" in text and FILTER not in text

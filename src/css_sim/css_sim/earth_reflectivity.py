@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Light of the Earth that a mission asks for: which model, which reflectivity, and whether a case draws its own."""
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,6 +10,7 @@ from css_common.random_streams import RandomKey
 from css_common.schema import Table, Values, choice, flag, real, text
 from css_environment.reflectivity import (
     Reflectivity,
+    draw_correlated,
     draw_reflectivity,
     named_reflectivity,
     read_reflectivity,
@@ -35,9 +37,11 @@ PARAMETERS: Table = (
     choice(
         "albedo.draw",
         "mean",
-        ("mean", "common", "per_cell"),
-        "means as they are, or drawn once per case: one draw for the whole Earth, or one for each cell of the grid",
+        ("mean", "common", "per_cell", "correlated"),
+        "means as they are, or drawn once per case: one draw for the whole Earth, one for each cell of the grid, or "
+        "draws that are alike over an angle",
     ),
+    real("albedo.correlation_deg", 15.0, "deg", "that angle, at the centre of the Earth", low=2.5, high=90.0),
     real("albedo.factor", 1.0, "-", "multiplies all reflectivities", low=0.0, high=10.0),
     real("albedo.limit", 1.0, "-", "reflectivities are cut to this", low=0.0, high=1.0),
 )
@@ -50,7 +54,7 @@ def source(values: Values, epoch_ns: int) -> Reflectivity:
         ValueError: a file is missing or wrong.
     """
     albedo = values.albedo
-    if albedo.reflectivity == "zonal" and albedo.draw == "per_cell":
+    if albedo.reflectivity == "zonal" and albedo.draw in ("per_cell", "correlated"):
         return zonal_reflectivity()  # columns matter only to independent draws
     if albedo.reflectivity != "file":
         return named_reflectivity(albedo.reflectivity, albedo.constant, epoch_ns)
@@ -61,7 +65,9 @@ def case_reflectivity(values: Values, grid: Reflectivity, key: RandomKey) -> np.
     """Reflectivities (rows, columns) of one case [-]."""
     albedo = values.albedo
     drawn = np.array(grid.mean)
-    if albedo.draw != "mean":
+    if albedo.draw == "correlated":
+        drawn = draw_correlated(grid, key, math.radians(albedo.correlation_deg))
+    elif albedo.draw != "mean":
         draw_reflectivity(grid, key, albedo.draw == "common", drawn)
     return np.minimum(albedo.factor * drawn, albedo.limit)
 

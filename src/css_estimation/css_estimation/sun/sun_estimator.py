@@ -17,7 +17,7 @@ from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
-from css_estimation.sun.sun_heading import Aiding
+from css_estimation.sun.sun_heading import Aiding, Sky
 from css_estimation.sun.sun_tracking import RATE_CUTOFF
 from css_msgs.msg import SunEstimate
 
@@ -32,6 +32,18 @@ def hears_field(values: Values) -> bool:
 def hears_wheels(values: Values) -> bool:
     """Whether it listens to the speeds of the wheels."""
     return hasattr(values, "use_wheels") and values.use_wheels and values.wheels.fitted and len(values.wheels.axes) > 0
+
+
+def aiding_of(received: Received, sky: Sky) -> Aiding:
+    """What an algorithm is given beside the cells, of the inputs of one stamp."""
+    wheels = received.get("wheels")
+    return Aiding(
+        *gyro_reading(received["gyro"]),
+        *field_reading(received.get("field")),
+        _NO_SPEEDS if wheels is None else wheels.speed,
+        wheels is not None,
+        sky,
+    )
 
 
 class SunEstimator(Component):
@@ -98,14 +110,7 @@ class SunEstimator(Component):
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
-        wheels = received.get("wheels")
-        aiding = Aiding(
-            *gyro_reading(received["gyro"]),
-            *field_reading(received.get("field")),
-            _NO_SPEEDS if wheels is None else wheels.speed,
-            wheels is not None,
-            sky_at(self._sky, stamp_ns),
-        )
+        aiding = aiding_of(received, sky_at(self._sky, stamp_ns))
         self._state, heading = self._step(
             self._parameters,
             self._state,

@@ -10,8 +10,8 @@ R being the response, a_i the light of the mean Earth at the estimated attitude,
 c a_i. Where the Earth is not predicted a_i is half of its largest, and its error is white noise.
 
 Which cells see the Sun follows from the estimate. Its error decides for which of them that is sure: of the others, next
-to the edge of a view, those enter that are too bright for an Earth. A reading that the model explains worse than `gate`
-allows is refused.
+to the edge of a view, those enter that are too bright for an Earth. A reading that the model explains worse than
+`nis_gate` allows is refused.
 
 Updates are scalar, in sequence, in symmetric form: of the covariance S >= R > 0 is taken what the reading took away.
 """

@@ -81,7 +81,7 @@ def begin(
     begin_rate(p.motion, model, (0.0, 0.0, 0.0), p.motion.start_rate, wheels_b, x, covariance)
     cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
-    forget(covariance, GAIN, cells, p.errors.gain + p.errors.tilt)
+    forget(covariance, GAIN, cells, p.errors.cell)
     follow_only(m, 0)
 
 
@@ -185,3 +185,14 @@ def give_up(m: SunFilterMemory) -> tuple[int, int]:
             left += 1
             m.weights[k] -= highest
     return best, left
+
+
+@kernel
+def the_only_one(m: SunFilterMemory) -> int:
+    """The hypothesis that is followed; -1 when there are several, or none."""
+    only, count = -1, 0
+    for k in range(HYPOTHESES):
+        if m.weights[k] > DEAD:
+            only = k
+            count += 1
+    return only if count == 1 else -1

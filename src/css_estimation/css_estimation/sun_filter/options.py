@@ -2,6 +2,7 @@
 """What the Sun filter knows of its spacecraft, and what it takes its errors to be."""
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ WHEEL = np.dtype([(name, np.float64) for name in ("hx", "hy", "hz")], align=True
 """One reaction wheel: spin axis times spin inertia [kg m2]."""
 
 _IN_PLANE = 1e-9
+_NO_NORMAL = 1e-9
+_FEWEST = 2  # points of a table
 
 GAINS = reals("calibration.gains", (), "-", "output of each cell relative to the nominal; empty: all 1")
 DARKS = reals("calibration.darks", (), "-", "output of each cell in the dark; empty: all 0")
@@ -97,6 +100,11 @@ def _inverse_inertia(values: Values) -> Mat3:
     return mat3(np.linalg.inv(np.array(_inertia(values))))
 
 
+def _lasting(gain: float, tilt_deg: float) -> float:
+    """Variance of a cell's output relative to its own, by gain and by a tilt where that matters most, at 60 deg."""
+    return gain**2 + (math.tan(math.radians(60.0)) * math.radians(tilt_deg)) ** 2
+
+
 class Response(NamedTuple):
     """Output of a cell over the light that it receives."""
 
@@ -112,16 +120,35 @@ class CellErrors(NamedTuple):
 
     noise: float = made(square, real("noise", 0.006, "-", "white noise of a cell, 1 sigma", low=1e-6, high=1.0))
     common: float = made(
-        square, real("common_noise", 0.005, "-", "white error of the output common to all cells, 1 sigma", high=1.0)
+        square,
+        real("common_noise", 0.005, "-", "white error of the output common to all cells, 1 sigma", low=0.0, high=1.0),
     )
     scale: float = made(
-        square, real("scale_sigma", 0.02, "-", "slow error of the output common to all cells, 1 sigma", high=1.0)
+        square,
+        real("scale_sigma", 0.02, "-", "slow error of the output common to all cells, 1 sigma", low=0.0, high=1.0),
     )
     scale_time: float = given(real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9))
-    gain: float = made(square, real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", high=1.0))
-    tilt: float = made(
-        lambda degrees: math.radians(degrees) ** 2,
-        real("tilt_sigma_deg", 0.1, "deg", "lasting error of each cell's normal about an axis, 1 sigma", high=45.0),
+    cell: float = made(
+        _lasting,
+        real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", low=0.0, high=1.0),
+        real(
+            "tilt_sigma_deg",
+            0.1,
+            "deg",
+            "lasting error of each cell's normal about an axis, 1 sigma",
+            low=0.0,
+            high=45.0,
+        ),
+    )
+    cell_time: float = given(
+        real(
+            "tilt_time",
+            600.0,
+            "s",
+            "time in which the Sun moves so far over a cell that its tilt makes another error",
+            low=1.0,
+            high=1e9,
+        )
     )
 
 
@@ -129,7 +156,8 @@ class EarthErrors(NamedTuple):
     """How the real Earth differs from the mean one."""
 
     scale: float = made(
-        square, real("albedo.scale_sigma", 0.5, "-", "error of all reflectivities in common, 1 sigma", high=10.0)
+        square,
+        real("albedo.scale_sigma", 0.5, "-", "error of all reflectivities in common, 1 sigma", low=0.0, high=10.0),
     )
     scale_time: float = given(real("albedo.scale_time", 2000.0, "s", "correlation time of it", low=1.0, high=1e9))
     clouds: float = given(
@@ -190,7 +218,7 @@ class Motion(NamedTuple):
     )
     start_rate: float = made(  # [rad2/s2]
         lambda rate: math.radians(rate) ** 2,
-        real("rate.start_deg_s", 2.0, "deg/s", "rate of a body that nothing is known of, 1 sigma", high=100.0),
+        real("rate.start_deg_s", 2.0, "deg/s", "rate of a body that nothing is known of, 1 sigma", low=0.0, high=100.0),
     )
     torque: float = made(  # [(N m)2 s]
         lambda torque, time: torque * torque * time,
@@ -204,6 +232,7 @@ class Motion(NamedTuple):
             0.1,
             "deg/s",
             "change of the rate within a second where neither gyro nor momentum tells it, 1 sigma",
+            low=0.0,
             high=100.0,
         ),
     )
@@ -239,7 +268,7 @@ class Convergence(NamedTuple):
         )
     )
     gate: float = given(
-        real("gate", 25.0, "-", "normalised innovation squared beyond which a cell is refused", low=1.0, high=1e6)
+        real("nis_gate", 25.0, "-", "normalised innovation squared beyond which a cell is refused", low=1.0, high=1e6)
     )
 
 
@@ -258,3 +287,22 @@ class SunFilterParameters(NamedTuple):
 
 
 PARAMETERS = merged(table_of(SunFilterParameters), flight_sky.PARAMETERS)
+
+
+def conflicts(values: Values) -> Iterator[str]:
+    """What is wrong between the values, one message each."""
+    cells = len(values.cells.normals)
+    for parameter, what in ((GAINS, "numbers"), (DARKS, "numbers"), (NORMALS, "rows")):
+        given_ones = len(values[parameter])
+        if given_ones not in (0, cells):
+            yield f"{parameter.name}: {given_ones} {what} given, expected one for each of {cells} cells, or none"
+    if len(values[GAINS]) and not np.all(np.asarray(values[GAINS]) > 0.0):
+        yield f"{GAINS.name}: {np.min(values[GAINS]):g} given, expected gains above 0; a dead cell is left out as NaN"
+    if len(values[NORMALS]) and np.any(np.linalg.norm(np.reshape(values[NORMALS], (-1, 3)), axis=1) < _NO_NORMAL):
+        yield f"{NORMALS.name}: a row of zeros given, expected normals"
+    if values[CURVE] == "table" and len(values[TABLE]) < _FEWEST:
+        yield f"{TABLE.name}: {len(values[TABLE])} numbers given, but the curve is `table`; expected at least {_FEWEST}"
+    if len(values.spacecraft.inertia):
+        moments = np.linalg.eigvalsh(np.asarray(values.spacecraft.inertia, dtype=np.float64).reshape(3, 3))
+        if not moments[0] > 0.0:
+            yield f"spacecraft.inertia: a principal moment of {moments[0]:g} kg m^2 given, expected above 0"

@@ -100,6 +100,7 @@ _MOST = 4.0  # [rad2] reported variance
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
 
 PARAMETERS = options.PARAMETERS
+conflicts = options.conflicts
 _built = builder(SunFilterParameters)
 
 
@@ -299,6 +300,7 @@ def _forget_slowly(p: SunFilterParameters, dt: float, states: int, x, covariance
     """Errors of outputs and Earth go on."""
     cells = p.cells.shape[0]
     fade(SCALE, X_SCALE, 1, p.errors.scale_time, p.errors.scale, dt, states, x, covariance)
+    fade(GAIN, X_GAIN, cells, p.errors.cell_time, p.errors.cell, dt, states, x, covariance)
     if states > GAIN + cells:
         fade(EARTH, X_EARTH, 1, p.earth.scale_time, p.earth.scale, dt, states, x, covariance)
         fade(GAIN + cells, X_GAIN + cells, cells, p.earth.clouds_time, 1.0, dt, states, x, covariance)
@@ -416,6 +418,12 @@ def _progress(
         look_for_roll(p, memory, sun_n)
         stage, since = _STAGE_ROLL, 0.0
     return Progress(stage, True, since, contrary, faded), mode
+
+
+@kernel
+def knows_earth(state: SunFilterState) -> bool:
+    """Whether the light of the Earth is part of the state, and with it the turn about the Sun line."""
+    return state.progress.stage == _STAGE_ROLL
 
 
 @kernel

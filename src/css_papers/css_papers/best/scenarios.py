@@ -46,6 +46,7 @@ def scenarios() -> list[Scenario]:
         _of_the_paper("wavg", "the paper's average (wavg)", _CLOUDS),
         Scenario("gains 2 %, tilts 1 deg, uncalibrated", _UNCALIBRATED | _TOLD, 1.3),
         Scenario("an Earth 1.5 times as bright again", {"css_array.albedo.factor": "2.25"}, side=True),
+        *(_correlated(angle) for angle in (15, 30)),
         Scenario("all clouds in common", {"css_array.albedo.draw": "common"}, side=True),
         Scenario("another model of the Earth", {f"{FILTER}.albedo.reflectivity": "knocke"}, side=True),
         Scenario("place unknown", {f"{FILTER}.use_orbit": "false"}),
@@ -66,6 +67,11 @@ def _of_the_paper(estimator: str, label: str, settings: Mapping[str, str]) -> Sc
 def _orbit(raan: int, month: str) -> Scenario:
     settings = {"orbit.raan_deg": str(raan), "mission.epoch": f"2013-{month}-21T00:00:00Z"}
     return Scenario(f"node at {raan} deg, 21 {_MONTHS[month]}", settings, 0.3, side=True)
+
+
+def _correlated(angle: int) -> Scenario:
+    settings = {"css_array.albedo.draw": "correlated", "css_array.albedo.correlation_deg": str(angle)}
+    return Scenario(f"clouds alike over {angle} deg", settings, 0.5, side=angle != 15)
 
 
 _MONTHS = {"03": "March", "09": "September", "12": "December"}

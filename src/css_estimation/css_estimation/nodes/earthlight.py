@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude about all three axes from cells, gyro or wheels, and the orbit; no magnetometer."""
+
+from collections.abc import Iterable
+
+from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.kernel import typed_call
+from css_common.run import node_main
+from css_common.schema import Values
+from css_common.sensor_inputs import gyro_input
+from css_estimation.messages import attitude_estimate_fields, cells_input, wheels_input
+from css_estimation.sun.flight_sky import flight_sky, sky_at
+from css_estimation.sun.sun_estimator import aiding_of, hears_wheels
+from css_estimation.sun_filter import earthlight
+from css_msgs.msg import AttitudeEstimate
+
+
+class Earthlight(Component):
+    """Attitude by the Sun filter: the Sun is one direction, the light of the Earth on the cells the other."""
+
+    shared = ("cells", "orbit", "spacecraft", "wheels")
+    parameters = earthlight.PARAMETERS
+
+    @classmethod
+    def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
+        inputs = (cells_input(values), gyro_input(values))
+        return (*inputs, wheels_input(values)) if hears_wheels(values) else inputs
+
+    @classmethod
+    def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
+
+    @classmethod
+    def needed(cls, values: Values) -> tuple[str, ...]:
+        return ("cells.normals", "orbit.source")
+
+    @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        return earthlight.conflicts(values)
+
+    def configure(self) -> None:
+        self._parameters = earthlight.parameters(self.values)
+        self._state = earthlight.initial_state(self._parameters)
+        self._memory = earthlight.initial_memory(self._parameters)
+        self._step = typed_call(earthlight.step)
+        self._sky = flight_sky(self.values)
+        self._last_stamp_ns: int | None = None
+
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._parameters = earthlight.parameters(values)
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        self._last_stamp_ns = stamp_ns
+        cells = received["cells"]
+        assert cells is not None  # a required input
+        self._state, solution = self._step(
+            self._parameters,
+            self._state,
+            self._memory,
+            since_ns / 1e9,
+            cells.voltages,
+            aiding_of(received, sky_at(self._sky, stamp_ns)),
+        )
+        fields = attitude_estimate_fields(solution, self._memory.covariance)
+        return {"attitude": self.message("attitude", stamp_ns, **fields)}
+
+
+main = node_main(Earthlight)
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Attitude about all three axes from cells and orbit alone: the Sun is one direction, the light of the Earth the other.
+
+It is the attitude that the Sun filter carries anyway. While several turns about the Sun line are still followed there
+is no attitude to tell (validity `NONE`): the one that leads may be wrong by any angle. Modes are those of `sun_filter`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.attitude import dcm_to_mrp
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, matmul, multiply, transpose
+from css_estimation.attitude.attitude_solution import (
+    USED_GYRO,
+    USED_SUN,
+    VALIDITY_HELD,
+    VALIDITY_NONE,
+    VALIDITY_VALID,
+    AttitudeSolution,
+)
+from css_estimation.sun.sun_heading import Aiding
+from css_estimation.sun_filter import options, sun_filter
+from css_estimation.sun_filter.hypotheses import the_only_one
+from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, SunFilterMemory, dcm_of, triple
+from css_estimation.sun_filter.motion import RATE_BY_GYRO
+from css_estimation.sun_filter.sun_filter import MODE_EARTH, SunFilter, SunFilterState, knows_earth
+
+PARAMETERS = options.PARAMETERS
+parameters = sun_filter.parameters
+conflicts = options.conflicts
+initial_state = sun_filter.initial_state
+
+_NO_BIAS: Vec3 = (0.0, 0.0, 0.0)
+
+
+class EarthlightMemory(NamedTuple):
+    """Arrays that `step` advances in place."""
+
+    filter: SunFilterMemory
+    covariance: np.ndarray  # (6, 6) of the attitude error [rad, rotation vector in b] and the gyro bias [rad/s]
+
+
+def initial_memory(p: SunFilter) -> EarthlightMemory:
+    """Nothing known."""
+    return EarthlightMemory(sun_filter.initial_memory(p), np.zeros((6, 6)))
+
+
+@kernel
+def _write_covariance(p: SunFilter, x, covariance, by_gyro: bool, out) -> None:
+    """Covariance in b; without gyro that of its bias is what it was at the start."""
+    dcm_bn = dcm_of(x)
+    theta = triple(covariance[THETA], THETA), triple(covariance[THETA + 1], THETA), triple(covariance[THETA + 2], THETA)
+    attitude = matmul(matmul(dcm_bn, theta), transpose(dcm_bn))
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 0.5 * (attitude[i][j] + attitude[j][i])
+            out[3 + i, 3 + j] = p.motion.gyro_bias if i == j else 0.0
+            if by_gyro:
+                out[3 + i, 3 + j] = 0.5 * (covariance[RATE + i, RATE + j] + covariance[RATE + j, RATE + i])
+    for j in range(3):
+        column = (covariance[THETA, RATE + j], covariance[THETA + 1, RATE + j], covariance[THETA + 2, RATE + j])
+        turned = multiply(dcm_bn, column)
+        for i in range(3):
+            out[i, 3 + j] = out[3 + j, i] = turned[i] if by_gyro else 0.0
+
+
+@kernel
+def step(
+    p: SunFilter, state: SunFilterState, memory: EarthlightMemory, dt: float, voltages, aiding: Aiding
+) -> tuple[SunFilterState, AttitudeSolution]:
+    """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
+    state, heading = sun_filter.step(p, state, memory.filter, dt, voltages, aiding)
+    k = the_only_one(memory.filter)
+    by_gyro = state.rate.model == RATE_BY_GYRO
+    validity, used = VALIDITY_NONE, 0
+    sigma_bn, bias_b = (0.0, 0.0, 0.0), _NO_BIAS
+    if k >= 0 and knows_earth(state):
+        x = memory.filter.estimates[k]
+        sigma_bn = dcm_to_mrp(dcm_of(x))
+        bias_b = triple(x, X_RATE) if by_gyro else _NO_BIAS
+        _write_covariance(p, x, memory.filter.covariances[k], by_gyro, memory.covariance)
+        validity = VALIDITY_VALID if heading.mode == MODE_EARTH and heading.nis_dof > 0 else VALIDITY_HELD
+        used = (USED_GYRO if by_gyro else 0) | (USED_SUN if heading.nis_dof > 0 else 0)
+    solution = AttitudeSolution(
+        sigma_bn,
+        heading.omega_bn_b,
+        bias_b,
+        heading.age if validity != VALIDITY_NONE else 0.0,
+        heading.nis,
+        heading.nis_dof,
+        heading.lit_mask,
+        validity,
+        used,
+        heading.mode,
+    )
+    return state, solution
