@@ -13,7 +13,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from css_bringup.json_process import MeasurementError, number, run_for_object
 
@@ -88,16 +88,8 @@ class Basilisk:
         Raises:
             MeasurementError: Basilisk fails, or the flight does not do what it should.
         """
-        env = {name: value for name, value in os.environ.items() if name not in ("LD_LIBRARY_PATH", "VIRTUAL_ENV")}
-        env["MPLCONFIGDIR"] = str(self.folder / "matplotlib")
         flag = "--albedo" if albedo else "--no-albedo"
-        command: list[str | Path] = [self._python, "-I", self._script, scenario, flag, "--estimator", estimator]
-        try:
-            result = run_for_object("Basilisk", command, env)
-        except MeasurementError as error:
-            if "ModuleNotFoundError" in str(error) or "does not start" in str(error):
-                raise MeasurementError(f"{error}; remove {self.folder} and start again") from error
-            raise
+        result = self.run(self._script, scenario, flag, "--estimator", estimator)
         if result.get("heading_error_mean_deg") is None:
             raise MeasurementError("Basilisk's flight has no sunlit time after acquisition; give a longer --duration")
         steps, cpu_s = number("Basilisk", result, "steps"), number("Basilisk", result, "cpu_s")
@@ -112,6 +104,21 @@ class Basilisk:
         if wrong := complaint(flight, albedo):
             raise MeasurementError(f"Basilisk with {estimator} {wrong}; its speed would mean nothing")
         return flight
+
+    def run(self, script: Path, *arguments: str | Path) -> dict[str, Any]:
+        """The JSON object that a script prints last in Basilisk's environment.
+
+        Raises:
+            MeasurementError: it fails.
+        """
+        env = {name: value for name, value in os.environ.items() if name not in ("LD_LIBRARY_PATH", "VIRTUAL_ENV")}
+        env["MPLCONFIGDIR"] = str(self.folder / "matplotlib")
+        try:
+            return run_for_object("Basilisk", [self._python, "-I", script, *arguments], env)
+        except MeasurementError as error:
+            if "ModuleNotFoundError" in str(error) or "does not start" in str(error):
+                raise MeasurementError(f"{error}; remove {self.folder} and start again") from error
+            raise
 
     @property
     def _python(self) -> Path:

@@ -90,3 +90,15 @@ def is_opposed(layout: CellLayout, i: int, mask: int) -> bool:
         if mask >> j & 1 and cell.nx * other.nx + cell.ny * other.ny + cell.nz * other.nz < -_IN_PLANE:
             return True
     return False
+
+
+@kernel
+def informs(layout: CellLayout, i: int, output: float, level: float, predicted_b: Vec3, missing: int) -> bool:
+    """Whether a filter that expects the Sun in the unit direction `predicted_b` takes the output of cell `i`.
+
+    A cell above `level` sees the Sun, and one that should see it says where the Sun is not, unless the cell that looks
+    the other way is in `missing` (result of `missing_cells`).
+    """
+    if not (-READABLE < output < READABLE and (output > level or sees(layout, i, predicted_b))):
+        return False
+    return not (missing != 0 and output <= level and is_opposed(layout, i, missing))

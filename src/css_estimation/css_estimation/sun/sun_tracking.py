@@ -131,6 +131,12 @@ def turned_sun(sun_b: Vec3, omega_bn_b: Vec3, dt: float) -> Vec3:
 
 
 @kernel
+def makes_pair(state: TrackingState, dt: float, gyro_ok: bool, estimate: Estimate) -> bool:
+    """Whether the body rate follows from the last Sun vector and this one."""
+    return not gyro_ok and estimate.valid and not estimate.restarted and state.validity == VALIDITY_VALID and dt > 0.0
+
+
+@kernel
 def finish_cycle(
     p: TrackingParameters,
     state: TrackingState,
@@ -147,6 +153,24 @@ def finish_cycle(
         gyro_ok: result of `gyro_usable`.
         shadow: result of `detect_eclipse`.
     """
+    rate = (0.0, 0.0, 0.0)
+    if makes_pair(state, dt, gyro_ok, estimate):
+        rate = rate_from_sun_vectors(estimate.sun_b, state.sun_b, dt, p.rate_limit)
+    return finish_with_rate(p, state, dt, aiding, gyro_ok, shadow, estimate, rate)
+
+
+@kernel
+def finish_with_rate(
+    p: TrackingParameters,
+    state: TrackingState,
+    dt: float,
+    aiding: Aiding,
+    gyro_ok: bool,
+    shadow: tuple[EclipseState, int],
+    estimate: Estimate,
+    rate: Vec3,
+) -> tuple[TrackingState, SunHeading]:
+    """As `finish_cycle`, with the rate across the Sun line [rad/s] that takes the place of the gyro's."""
     eclipse_state, eclipse = shadow
     field, change = track_field(p.field, state.field, dt, aiding)
 
@@ -156,9 +180,8 @@ def finish_cycle(
     if gyro_ok:
         rate_source = RATE_GYRO
         omega_bn_b = low_pass(omega_bn_b, aiding.gyro_b, gain)
-    elif estimate.valid and not estimate.restarted and state.validity == VALIDITY_VALID and dt > 0.0:
+    elif makes_pair(state, dt, gyro_ok, estimate):
         rate_source = RATE_SUN
-        rate = rate_from_sun_vectors(estimate.sun_b, state.sun_b, dt, p.rate_limit)
         if p.field.use_field:
             field, omega_bn_b = filter_with_sun(
                 p.field, field, change, estimate.sun_b, omega_bn_b, rate, gain, p.rate_limit

@@ -32,7 +32,7 @@ from css_common.kernel import kernel
 from css_common.schema import Values, choice, real
 from css_common.vectors import Vec3
 from css_estimation.sun import sun_tracking
-from css_estimation.sun.cell_layout import READABLE, CellLayout, brightest, cell_layout, is_opposed, missing_cells, sees
+from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout, informs, missing_cells
 from css_estimation.sun.eclipse_detector import detect_eclipse
 from css_estimation.sun.lit_cells import CELL_SIGMA, Gate
 from css_estimation.sun.snapshot import MODE_NO_SUN
@@ -159,9 +159,7 @@ def update_cells(
     missing = missing_cells(voltages)
     for i in range(voltages.shape[0]):
         v = voltages[i]
-        if not (-READABLE < v < READABLE and (v > level or sees(p.layout, i, predicted_b))):
-            continue
-        if missing != 0 and v <= level and is_opposed(p.layout, i, missing):
+        if not informs(p.layout, i, v, level, predicted_b, missing):
             continue
         v = min(max(v, -_LARGEST_READING), _LARGEST_READING)
         normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the flight's own orbit model says, and when nobody is asked."""
+
+import numpy as np
+import pytest
+from okeefe_spacecraft import okeefe_values
+
+from css_common.epochs import parse_utc
+from css_environment.earth_light import DISC, DISC_LIGHT
+from css_environment.mission_environment import MissionEnvironment
+from css_estimation.nodes.ekf import Ekf
+from css_estimation.nodes.sun_filter import SunFilter
+from css_estimation.sun.flight_sky import flight_sky, sky_at
+from css_estimation.sun.sun_heading import (
+    PREDICTION_ECLIPSED,
+    PREDICTION_SUNLIT,
+    PREDICTION_UNKNOWN,
+    UNKNOWN_SKY,
+)
+
+NOON_S, NIGHT_S = 600.0, 4000.0
+
+
+def values(kind=SunFilter, **changes):
+    return okeefe_values(kind.table(), **changes)
+
+
+def stamp(given, elapsed_s):
+    return parse_utc(given.mission.epoch) + round(elapsed_s * 1e9)
+
+
+@pytest.mark.parametrize(("elapsed_s", "predicted"), [(NOON_S, PREDICTION_SUNLIT), (NIGHT_S, PREDICTION_ECLIPSED)])
+def test_sun_and_shadow_are_those_of_the_orbit(elapsed_s, predicted):
+    given = values()
+    sky = flight_sky(given).at(stamp(given, elapsed_s))
+    expected = MissionEnvironment(given, field=False).at(elapsed_s)
+    assert sky.known and sky.predicted == predicted
+    assert (sky.sun_n, sky.solar_flux, sky.illumination) == (
+        expected.sun_n,
+        expected.solar_flux,
+        expected.illumination,
+    )
+
+
+def test_the_light_is_that_of_the_earth_which_the_filter_expects():
+    bright, dark = values(albedo__factor=2.0), values(albedo__reflectivity="constant", albedo__constant=0.0)
+    usual = values()
+    light = {name: flight_sky(v).at(stamp(v, NOON_S)).light for name, v in (("2", bright), ("0", dark), ("1", usual))}
+    assert light["1"][DISC + DISC_LIGHT] > 0.05
+    # reflectivities above a half of which the double is cut to one lie at the poles, out of sight here
+    assert light["2"][DISC + DISC_LIGHT] == pytest.approx(2.0 * light["1"][DISC + DISC_LIGHT], rel=0.02)
+    assert light["0"][DISC + DISC_LIGHT] == 0.0
+
+
+def test_who_asks_for_nothing_is_told_nothing():
+    for given in (values(use_orbit=False), values(orbit__source="none"), values(Ekf)):
+        assert flight_sky(given) is None
+        assert sky_at(flight_sky(given), stamp(given, 0.0)) is UNKNOWN_SKY
+    assert UNKNOWN_SKY.predicted == PREDICTION_UNKNOWN and not np.any(UNKNOWN_SKY.light)
+
+
+def test_an_estimator_that_knows_no_earth_may_ask_for_the_shadow_alone():
+    given = values(Ekf, eclipse__source="both")
+    sky = flight_sky(given).at(stamp(given, NIGHT_S))
+    assert sky.predicted == PREDICTION_ECLIPSED and not np.any(sky.light)
