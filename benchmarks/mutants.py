@@ -9,11 +9,12 @@ out. Limits are in processor time: a test that takes too long has noticed the mu
 too long the verdict is open.
 
 Verdicts are lines of JSON in a file; what stands there is not tested again, so that a run can be continued. The last
-line is one JSON object. Survivors that do the same as the original are listed in `equivalent_mutants.json`, with the
-reason, and do not count.
+line is one JSON object. Survivors that do the same as the original, or that no test should tell from it, are listed in
+`equivalent_mutants.json`, with the reason, and do not count. A draw is that of the sources as they are: once they have
+changed, `--known` judges the mutants of the file again instead of others.
 
     ./sunpoint shell -c "python benchmarks/mutants.py --count 200 --seed 1 --minutes 120"
-    ./sunpoint shell -c "python benchmarks/mutants.py --count 200 --seed 1 --again survived"
+    ./sunpoint shell -c "python benchmarks/mutants.py --known --again survived"
 """
 
 import argparse
@@ -21,7 +22,6 @@ import difflib
 import json
 import os
 import random
-import re
 import resource
 import shutil
 import signal
@@ -87,6 +87,23 @@ def draw(root: Path, seed: int, count: int) -> Iterator[Mutant]:
         package = packages[number % len(packages)]
         if waiting[package]:
             yield dice.choice(lines[package][waiting[package].pop()])
+
+
+def recall(root: Path, names: Iterable[str]) -> Iterator[Mutant]:
+    """Mutants by their names, the first of several called the same; what the sources no longer hold is left out."""
+    wanted: dict[Path, set[str]] = defaultdict(set)
+    for name in names:
+        wanted[Path(name.partition(": ")[0])].add(name)
+    for place, waiting in wanted.items():
+        source = (root / place).read_bytes() if (root / place).is_file() else b""
+        lines = source.decode().splitlines()
+        for mutation in mutations(source):
+            # a name begins with its line; comparing the texts of every mutant would take minutes
+            if any(name.startswith(f"{place}: {lines[mutation.line - 1].strip()}") for name in waiting):
+                mutant = Mutant(place, mutation, source)
+                if mutant.name in waiting:
+                    waiting.remove(mutant.name)
+                    yield mutant
 
 
 class Trial:
@@ -181,28 +198,26 @@ class Trial:
             [*command, *(f"--deselect={test}" for test in sorted(broken)), *names],
             cwd=self._copy,
             env=self._environment(progress),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
             start_new_session=True,
             preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 3)),
         )
         try:
             # a test that waits and uses no processor time is ended by pytest's own limit
-            said, _ = process.communicate()
+            process.wait()
         finally:
             _end(process)
             self._forget_kernels()
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        test = json.loads(progress.read_text()) if progress.exists() else {"test": "", "cpu_s": 0.0}
+        noted = {"test": "", "cpu_s": 0.0} | (json.loads(progress.read_text()) if progress.exists() else {})
         if process.returncode in (0, 5):  # all passed, or there was none
             return SURVIVED, "", used
         if process.returncode < 0:  # it ran out of processor time, or fell over
-            slow = -process.returncode == signal.SIGXCPU and used - test["cpu_s"] < TEST_LIMIT
-            return (OPEN if slow else KILLED), test["test"], used
-        failed = re.search(r"^(?:FAILED|ERROR) (\S+(?: [^-\s]\S*)*)", said, re.MULTILINE)
-        return KILLED, failed.group(1) if failed else test["test"], used
+            slow = -process.returncode == signal.SIGXCPU and used - noted["cpu_s"] < TEST_LIMIT
+            return (OPEN if slow else KILLED), noted["test"], used
+        return KILLED, noted.get("failed", noted["test"]), used
 
     def _environment(self, progress: Path) -> dict[str, str]:
         packages = [str(place) for place in sorted((self._copy / "src").iterdir()) if place.name != "css_msgs"]
@@ -232,11 +247,13 @@ def _end(process: subprocess.Popen) -> None:
 def tested(options: argparse.Namespace, known: dict[str, dict[str, Any]]) -> Iterator[tuple[Mutant, dict[str, Any]]]:
     """Mutants with their verdicts, those that are known without a test."""
     end = time.monotonic() + 60.0 * options.minutes
+    mutants = recall(ROOT, known) if options.known else draw(ROOT, options.seed, options.count)
+    equal = equivalent()
     with tempfile.TemporaryDirectory(prefix="sunpoint-mutants-") as folder:
         trial = None
-        for mutant in draw(ROOT, options.seed, options.count):
+        for mutant in mutants:
             verdict = known.get(mutant.name)
-            if verdict is None or verdict["verdict"] in options.again:
+            if verdict is None or (verdict["verdict"] in options.again and mutant.name not in equal):
                 if time.monotonic() > end:
                     continue
                 trial = trial or Trial(ROOT, Path(folder) / "project", options.seconds, options.beyond)
@@ -247,12 +264,17 @@ def tested(options: argparse.Namespace, known: dict[str, dict[str, Any]]) -> Ite
             yield mutant, verdict
 
 
+def equivalent() -> set[str]:
+    """Mutants that do the same as the original; why stands beside them."""
+    return {entry["mutant"] for entry in json.loads(EQUIVALENT.read_text(encoding="utf-8"))}
+
+
 def summary(found: list[tuple[Mutant, dict[str, Any]]]) -> dict[str, Any]:
     """Prints the survivors with their changes; the score, of all and by package."""
-    reasons = {entry["mutant"]: entry["reason"] for entry in json.loads(EQUIVALENT.read_text(encoding="utf-8"))}
+    equal = equivalent()
     counts: dict[str, Counter[str]] = defaultdict(Counter)
     for mutant, verdict in found:
-        outcome = EQUAL if verdict["verdict"] == SURVIVED and mutant.name in reasons else verdict["verdict"]
+        outcome = EQUAL if verdict["verdict"] == SURVIVED and mutant.name in equal else verdict["verdict"]
         counts[mutant.file.parts[1]][outcome] += 1
         if outcome == SURVIVED:
             print(f"\nsurvived: {mutant.file}, {mutant.mutation.kind}\n{mutant.diff}")
@@ -294,6 +316,9 @@ def main() -> int:
         "--again", action="append", default=[], choices=(SURVIVED, OPEN, KILLED), help="test those once more"
     )
     parser.add_argument(
+        "--known", action="store_true", help="the mutants of the verdicts, whatever is drawn now: sources have changed"
+    )
+    parser.add_argument(
         "--verdicts", type=Path, default=ROOT / "log" / "mutants.jsonl", metavar="FILE", help="default: %(default)s"
     )
     options = parser.parse_args()
@@ -306,7 +331,7 @@ def main() -> int:
     except KeyboardInterrupt:
         interrupted = True
     result = summary(found)
-    print(json.dumps({"seed": options.seed, **result}))
+    print(json.dumps({"seed": None if options.known else options.seed, **result}))
     if interrupted:
         print("mutants: interrupted; the same command goes on from here", file=sys.stderr)
         return 128 + signal.SIGINT

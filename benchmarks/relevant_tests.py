@@ -8,6 +8,8 @@ from pathlib import Path
 
 # This module imports what missions name: whoever loads a mission may run any node.
 _LOADER = "css_common.node_files"
+# This module imports the paper that it is asked for.
+_PAPERS = "css_papers.papers"
 # Whoever knows the verbs starts their executables.
 _VERBS = "bootstrap.verbs"
 
@@ -55,10 +57,14 @@ class Sources:
             elif isinstance(node, ast.ImportFrom) and node.module:
                 names.add(node.module)
                 names.update(f"{node.module}.{alias.name}" for alias in node.names)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                names.add(node.value)  # a module that is imported by its name, when it is needed
         found = [self.modules[name] for name in sorted(names) if name in self.modules]
         found += [self.helpers[name] for name in sorted(names) if name in self.helpers]
         if self.modules.get(_LOADER) == file:
             found += [source for name, source in self.modules.items() if ".nodes." in name]
+        if self.modules.get(_PAPERS) == file:
+            found += [source for name, source in self.modules.items() if name.endswith(".paper")]
         if _VERBS in names:
             found += [source for name, source in self.modules.items() if ".commands." in name]
         return tuple(found)

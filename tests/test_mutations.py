@@ -2,6 +2,9 @@
 """What `benchmarks/mutants.py` changes, and by which tests it looks for the change."""
 
 import ast
+import json
+import os
+import subprocess
 import sys
 from collections import Counter
 
@@ -9,7 +12,7 @@ import pytest
 from listing import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
-from mutants import draw
+from mutants import draw, recall
 from mutations import mutations
 from relevant_tests import Sources
 
@@ -75,6 +78,12 @@ def test_the_draw_is_even_over_packages_and_the_beginning_of_a_longer_one():
     assert max(counts.values()) - min(counts.values()) <= 1
 
 
+def test_mutants_are_found_again_by_their_names():
+    names = [mutant.name for mutant in draw(ROOT, 1, 30)]
+    gone = ["src/css_sim/css_sim/gyro.py: no such line -> pass", "src/css_sim/css_sim/no_such_file.py: a -> pass"]
+    assert sorted(mutant.name for mutant in recall(ROOT, [*names, *gone])) == sorted(names)
+
+
 def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sources):
     own, others = sources.seen_by(ROOT / "src/css_sim/css_sim/gyro.py", 3)
     names = [test.name for test in own]
@@ -87,3 +96,37 @@ def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sou
     # a command by what starts its verb
     _, others = sources.seen_by(ROOT / "src/css_bringup/css_bringup/commands/demo.py", 3)
     assert ROOT / "tests/test_verbs.py" in others
+    # the work of a command is imported by name when it is asked for, and so is a paper
+    own, _ = sources.seen_by(ROOT / "src/css_bringup/css_bringup/verbs/replay.py", 0)
+    assert ROOT / "src/css_bringup/test/test_bringup_requests.py" in own
+    own, _ = sources.seen_by(ROOT / "src/css_papers/css_papers/digregorio/figures.py", 0)
+    assert ROOT / "src/css_papers/test/test_digregorio_page.py" in own
+
+
+FAILING = """
+import pytest
+
+@pytest.mark.parametrize("text", ["good", "1 25544U  - [x]::y  9.5"])
+def test_of_text(text):
+    assert text == "good"
+"""
+
+
+@pytest.mark.parametrize(
+    ("source", "failed"),
+    [(FAILING, "test_some.py::test_of_text[1 25544U  - [x]::y  9.5]"), ("import nowhere_at_all", "test_some.py")],
+)
+def test_the_test_that_failed_is_known_whatever_its_name(tmp_path, source, failed):
+    (tmp_path / "test_some.py").write_text(source)
+    environment = os.environ | {
+        "PYTHONPATH": os.pathsep.join([str(ROOT / "benchmarks"), os.environ.get("PYTHONPATH", "")]),
+        "MUTANT_PROGRESS": str(tmp_path / "progress.json"),
+    }
+    command = [sys.executable, "-m", "pytest", "-qx", "-p", "no:cacheprovider", "-p", "one_test"]
+
+    def noted(what):
+        subprocess.run([*command, what], cwd=tmp_path, env=environment, capture_output=True, check=False)
+        return json.loads((tmp_path / "progress.json").read_text())["failed"]
+
+    assert noted("test_some.py") == failed
+    assert noted(failed) == failed

@@ -11,6 +11,8 @@ from synthetic_flight import columns, estimates, stamps, tilted, truth
 from css_analysis.figure_style import binned, colours
 from css_analysis.flight_figures import write_figures
 from css_analysis.flight_log import FlightLog
+from css_analysis.flight_panels import time_axis
+from css_common.mission import load_mission
 from css_msgs.msg import ControlStatus, CssVoltages, WheelState
 
 STEPS = 3000
@@ -76,6 +78,16 @@ def test_an_estimator_that_never_estimates(tmp_path):
     log = full_log()
     log.estimates["ekf"].validity[:] = 0
     assert is_picture(write_figures(log, tmp_path)[1])
+
+
+@pytest.mark.parametrize("begin_s", [0.0, 350.0, 5000.0])
+@pytest.mark.parametrize(("length_s", "label", "scale"), [(599.0, "time [s]", 1.0), (601.0, "time [min]", 60.0)])
+def test_time_is_in_minutes_when_a_flight_is_long_not_when_it_begins_late(begin_s, length_s, label, scale):
+    late = stamps(1)[0] + (1e9 * np.array([begin_s, begin_s + length_s])).astype(np.int64)
+    log = FlightLog("a part", mission=load_mission("okeefe_2013"), voltages=columns(CssVoltages, late))
+    axis = time_axis(log)
+    assert (axis.label, axis.scale) == (label, scale)
+    assert (axis.first, axis.last) == pytest.approx((begin_s / scale, (begin_s + length_s) / scale))
 
 
 def test_no_extreme_is_lost_and_gaps_stay():

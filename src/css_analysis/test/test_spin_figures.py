@@ -15,16 +15,22 @@ EVENTS = [(62.19, "motor separation"), (66.17, "nosecone"), (69.18, "booms"), (3
 
 
 @pytest.fixture
-def axes(tmp_path, monkeypatch):
+def figures(monkeypatch):
+    """What was saved."""
+    saved, save = [], spin_figures.save
+    monkeypatch.setattr(spin_figures, "save", lambda figure, path: saved.append(figure) or save(figure, path))
+    return saved
+
+
+@pytest.fixture
+def axes(tmp_path, figures):
     """Both parts of the figure of a flight of 374 s, drawn."""
-    figures = []
-    monkeypatch.setattr(spin_figures, "save", lambda figure, path: figures.append(figure) or path)
     time = np.arange(0.2, 374.0, 1 / 5.5)
     rate = 2.0 * np.pi * (np.where(time < 69.18, 6.0, 5.45) + 0.3 * np.sin(24.0 * time))
     zero = np.zeros_like(time)
     passages = Passages(time, 0.4 + 0.1 * np.sin(24.0 * time), rate, zero, zero, zero)
     spin_figures.write_rate_figure(passages, tmp_path / "figure_4.png", EVENTS)
-    figures[0].canvas.draw()
+    figures[0].canvas.draw()  # in its own resolution
     return figures[0].axes
 
 
@@ -40,9 +46,7 @@ def test_names_of_events_neither_overlap_nor_cover_the_data(axes):
     assert all(box.y0 >= highest for box in boxes.values())
 
 
-def test_the_line_of_a_microsecond_is_where_it_says(tmp_path, monkeypatch):
-    figures = []
-    monkeypatch.setattr(spin_figures, "save", lambda figure, path: figures.append(figure) or path)
+def test_the_line_of_a_microsecond_is_where_it_says(tmp_path, figures):
     candidates = [SimpleNamespace(frequency=1.6), SimpleNamespace(frequency=3.8)]
     studies = {"one head": SimpleNamespace(candidates=candidates, residuals=(2e-4, 3e-7))}
     spin_figures.write_alias_figure(studies, 5.45, tmp_path / "aliases.png")

@@ -17,9 +17,10 @@ from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.mission_asked_for import mission_of
 from css_bringup.processes import Child, Supervisor
 from css_bringup.replay_pass import parse_request
+from css_bringup.replayed import replayed
 from css_bringup.report import flight_object
 from css_bringup.verbs import fly as fly_verb
-from css_common.command import FAILED, USAGE
+from css_common.command import FAILED, INTERRUPTED, USAGE
 from css_common.mission import load_mission
 from css_common.mission_file import MissionError
 from css_common.preflight import preflight
@@ -139,6 +140,13 @@ def test_a_log_begins_with_its_flight_and_goes_on_after_a_restart(tmp_path):
         assert log.read_text() == "started\n" * starts
 
 
+@pytest.mark.parametrize("text", ["/a", "/a:/b", "/a=/b", ":=/b", "/a:=", ":=", ""])
+def test_a_remapping_of_another_form_is_one_line(text, capfd):
+    assert replay_command.main(["nothing", "--remap", "/x:=/y", text]) == USAGE
+    printed = capfd.readouterr().err
+    assert f"--remap {text!r}: expected OLD:=NEW" in printed and printed.count("\n") == 1
+
+
 def test_a_missing_recording_is_one_line_and_exit_code_2(tmp_path, capfd):
     assert replay_command.main([str(tmp_path / "nothing")]) == USAGE
     assert "nothing" in capfd.readouterr().err
@@ -189,6 +197,30 @@ def test_a_recorder_that_died_is_what_a_failed_flight_reports(tmp_path, capfd):
     printed = capfd.readouterr()
     assert printed.err.splitlines() == ["the flight failed: recorder died (SIGKILL)"]
     assert json.loads(printed.out.splitlines()[-1])["runs"] == []
+
+
+@pytest.mark.parametrize(
+    ("came", "code", "said"),
+    [
+        ({}, 0, []),
+        ({"interrupted": True}, INTERRUPTED, ["interrupted; the recording up to here is complete"]),
+        ({"failure": "dynamics died"}, FAILED, ["the flight failed: dynamics died"]),
+    ],
+)
+def test_what_came_of_a_flight_is_said_once_and_is_its_exit_code(came, code, said, capfd):
+    mission = load_mission("okeefe_2013")
+    assert fly_verb.conclude(mission, FlightResult(mission, **came), as_json=False) == code
+    assert capfd.readouterr().err.splitlines() == said
+
+
+def test_cycles_that_fail_in_a_replay_are_counted_and_the_first_is_reported():
+    mission, told = load_mission("okeefe_2013"), []
+    run = replayed(parse_request("wavg"), mission, mission, [], frozenset())
+    run.begin(told.append)
+    assert [run.step(mission.epoch_ns + k, {}) for k in range(3)] == 3 * [[]]
+    assert run.failures == 3 and run.messages == 0
+    (line,) = told
+    assert line.startswith("wavg: cycle failed: KeyError('cells')") and line.endswith("counted, not reported)")
 
 
 def test_json_result_has_the_documented_keys(tmp_path):

@@ -272,6 +272,16 @@ def test_latest_takes_inputs_that_are_a_little_ahead():
     assert offered(matcher, ("b", 6), ("a", 0)) == []
 
 
+@pytest.mark.parametrize("back_to", [50, 100])
+def test_latest_begins_anew_also_at_the_very_stamp_of_the_last_cycle(back_to):
+    matcher = matcher_of(AB, **LATEST)
+    # the clock went on while b was silent, and was set back then
+    assert offered(matcher, ("b", 100), ("a", 100), ("a", 200)) == [(100, "ab")]
+    assert offered(matcher, ("a", back_to)) == []
+    assert matcher.set_back == 1
+    assert offered(matcher, ("b", back_to + 1), ("a", back_to + 1)) == [(back_to + 1, "ab")]
+
+
 def test_latest_begins_anew_when_time_was_set_back():
     matcher = matcher_of(AB, **LATEST)
     assert offered(matcher, ("b", 1000), ("a", 1000), ("a", 0)) == [(1000, "ab")]

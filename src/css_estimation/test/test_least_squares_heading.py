@@ -15,6 +15,7 @@ from css_common.kernel import outer_kernel
 from css_common.sections import CELLS
 from css_common.vectors import angle_between
 from css_estimation.sun import least_squares as wls
+from css_estimation.sun import sun_patterns
 from css_estimation.sun.cell_layout import brightest
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_heading import NO_COVARIANCE
@@ -123,6 +124,16 @@ def test_error_over_the_sphere(request, name, mean, largest, beyond_30):
     # the table's finite number of directions scatters the means of patterns by up to 0.1 deg
     assert error.max() == pytest.approx(largest, abs=0.15)
     assert percent_of_sphere(error > 30.0) == pytest.approx(beyond_30, abs=0.02)
+
+
+def test_moments_of_patterns_are_those_of_unit_vectors_that_stand_for_patches():
+    """Of unit vectors tr C = 1 - |m|^2; a patch of the sphere adds its area / 4 pi about each axis."""
+    table, patch = parameters(use_dark_cells=True).patterns, 1.0 / len(sun_patterns._sphere())
+    mean = np.stack([table[name] for name in "xyz"], axis=1)
+    covariance = np.stack([table["".join(sorted(a + b))] for a in "xyz" for b in "xyz"], axis=1).reshape(-1, 3, 3)
+    trace = np.trace(covariance, axis1=1, axis2=2)
+    np.testing.assert_allclose(trace, 1.0 - np.sum(mean**2, axis=1) + 3.0 * patch, atol=1e-12)
+    assert np.linalg.eigvalsh(covariance).min() > patch * (1.0 - 1e-6)
 
 
 def test_dark_cells_help_warped_cells_as_much():

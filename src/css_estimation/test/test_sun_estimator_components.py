@@ -118,6 +118,19 @@ def test_a_gyro_that_says_off_and_a_silent_one_are_the_same(kind):
 
 
 @KINDS
+def test_a_covariance_that_is_not_estimated_says_so_and_nothing_else(kind):
+    component = build(kind)
+    estimates = [*run(component, 2, share=0.0), *run(component, 20, start=2)]
+    assert estimates[0].validity == SunEstimate.VALIDITY_NONE
+    for estimate in estimates:
+        covariance = estimate.covariance.reshape(3, 3)
+        if estimate.covariance[0] < 0.0 or estimate.validity == SunEstimate.VALIDITY_NONE:
+            assert estimate.covariance.tolist() == [-1.0] + 8 * [0.0]
+        else:
+            np.testing.assert_array_equal(covariance, covariance.T)
+
+
+@KINDS
 def test_a_second_run_gives_the_same_bytes(kind):
     codec = codec_of(SunEstimate)
     first, second = run(build(kind), 50), run(build(kind), 50)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from figure_checks import checked_figures
 from matplotlib import image
 from okeefe_spacecraft import okeefe_values
 from scipy.spatial.transform import Rotation
@@ -16,6 +17,8 @@ from css_monte_carlo.coverage import CellMap, Grid, grid_about, layout_of, map_c
 from css_monte_carlo.coverage_figures import write_coverage_figures
 from css_monte_carlo.coverage_statistics import coverage_object, holes, seen_fractions, wavg_errors
 from css_sim.nodes.css_array import CssArray
+
+__all__ = ["checked_figures"]  # every figure that is written is looked at
 
 Z = (0.0, 0.0, 1.0)
 COARSE = grid_about(Z, 90, 180)
@@ -159,7 +162,9 @@ def test_the_command(capsys, tmp_path):
     numbers = json.loads(out.splitlines()[-1])
     assert numbers["mission"] == "okeefe_2013" and numbers["cells"] == 8
     assert numbers["wavg_warped"]["mean_deg"] == pytest.approx(23.87, abs=0.005)
-    assert len(list(tmp_path.glob("*.png"))) == 3
+    files = sorted(tmp_path.glob("*.png"))
+    assert len(files) == 3
+    assert sorted(line for line in out.splitlines() if line.startswith("figure:")) == [f"figure: {f}" for f in files]
 
 
 def test_the_command_names_holes(capsys):

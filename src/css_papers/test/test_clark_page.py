@@ -17,7 +17,7 @@ from css_monte_carlo.study import Study
 from css_papers.clark import cases, paper
 from css_papers.clark.assumptions import AS_FLOWN, changes, fly_controls
 from css_papers.clark.cases import averages, configuration, fly_cases_of
-from css_papers.clark.cell import Cell
+from css_papers.clark.cell import CLOSEST_DEG, Cell
 from css_papers.clark.flights import DOUBLED, FLAT, PYRAMID, Flight, acquisition_min, fly, handover_min
 from css_papers.clark.numbers import FLAT_ANGLE, angle_rows
 from css_papers.clark.panel_power import REFLECTANCE, power_curve, reflector_power
@@ -85,6 +85,14 @@ def test_a_count_covers_the_angle_of_the_closed_form():
     response = cell.response()
     dark = response.angle_deg > 83.0
     assert np.all(response.output[dark] == 0.0) and np.all(response.output[~dark] > math.sin(math.radians(6.99)))
+
+
+def test_the_worst_angle_of_the_pyramid_is_that_of_its_collar():
+    mission = load_mission(PYRAMID)
+    collar = mission.node("css_array").values.collar
+    for number in collar.cells:
+        off_axis = math.degrees(math.acos(float(mission.values.cells.normals[number] @ collar.axis)))
+        assert off_axis - collar.full_deg == pytest.approx(CLOSEST_DEG, abs=0.05)
 
 
 def test_reflectors_add_what_they_reflect_and_lose_it_sooner():

@@ -2,6 +2,7 @@
 """The numbers of the ESPRIT page on a short flight, and the attitudes of many cases."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,9 @@ import pytest
 from css_analysis.spin_consistency import attitude_cases, attitude_error
 from css_analysis.spin_figures import write_coning_figure, write_rate_figure, write_spectrum_figure
 from css_common.mission import load_mission
+from css_papers.esprit import attitude_figure
 from css_papers.esprit.flights import attitude_errors, legs_of
-from css_papers.esprit.numbers import alias_rows, angle_rows, fixed_axis_row, rate_rows, true_max_min
+from css_papers.esprit.numbers import alias_rows, angle_rows, fixed_axis_row, period_rows, rate_rows, true_max_min
 from css_papers.esprit.spinning import fly_spinning
 from css_papers.papers import find_paper
 
@@ -48,6 +50,14 @@ def test_rows_of_a_flight_are_what_they_must_be(flight):
     assert "come from one sample a turn" in note and "from motion during a passage" in note
 
 
+def test_periods_are_those_that_flew(flight):
+    legs, flown = legs_of(flight), float(flight.mission.values.payload.coning_period[-1])
+    rows = period_rows(legs, legs)
+    assert [row.variant for row in rows] == ["", "", "drift", "drift"]
+    for row, leg in zip(rows, [*legs, *legs], strict=True):
+        assert row.here == pytest.approx(flown, abs=leg.resolution), row.quantity
+
+
 def test_the_coning_node_says_what_the_page_says(flight):
     legs = legs_of(flight)
     assert set(flight.coning) == {0, 1}
@@ -75,6 +85,19 @@ def test_figures_are_written(flight, tmp_path):
         write_spectrum_figure(flight.passages, windows, tmp_path / "spectrum.png"),
     ]
     assert all(file.stat().st_size > 10_000 for file in files)
+
+
+def test_the_attitudes_figure_shows_the_errors_and_how_many_cases_are_below_each(flight, tmp_path, monkeypatch):
+    figures, save = [], attitude_figure.save
+    monkeypatch.setattr(attitude_figure, "save", lambda figure, path: figures.append(figure) or save(figure, path))
+    errors, nees = attitude_errors(flight), np.array([4.0, 1.0, 9.0, 2.0])
+    attitude_figure.write_attitude_figure(errors, SimpleNamespace(nees=nees), tmp_path / "attitude.png")
+    above, below = figures[0].axes
+    np.testing.assert_array_equal(above.lines[0].get_xydata(), np.column_stack([errors.time, np.degrees(errors.angle)]))
+    cases, expected = below.lines
+    np.testing.assert_array_equal(cases.get_xydata(), [[1.0, 0.125], [2.0, 0.375], [4.0, 0.625], [9.0, 0.875]])
+    # 95 % of chi-square with three degrees of freedom is below 7.815
+    assert np.interp(7.815, *expected.get_data()) == pytest.approx(0.95, abs=1e-3)
 
 
 def test_a_fixed_axis_errs_by_less_than_two_counts():

@@ -10,9 +10,10 @@ from synthetic_study import case_table, percentile_table
 
 from css_analysis.flight_metrics import Windows
 from css_common.mission import load_mission
+from css_monte_carlo.coverage_statistics import coverage_object
 from css_monte_carlo.study import Configuration, Study, read_study
 from css_papers.commands.reproduce import main
-from css_papers.okeefe import paper
+from css_papers.okeefe import paper, sensor_part
 from css_papers.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION, Entry
 from css_papers.okeefe.flight_figures import Shadow, Variant
 from css_papers.okeefe.flights import merit
@@ -106,6 +107,8 @@ def made_up(mission, configurations, cases, folder, **_):
 
 def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(paper, "run_study", made_up)
+    mapped, write = [], sensor_part.write_coverage_figures
+    monkeypatch.setattr(sensor_part, "write_coverage_figures", lambda *given: mapped.append(given) or write(*given))
     assert main(["okeefe", "--cases", "30", "--out", str(tmp_path / "new"), "--json"]) == 0
     folder = tmp_path / "new"
     out = capsys.readouterr().out
@@ -123,6 +126,9 @@ def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
         assert stated in printed
     assert by_name["sunlight in one orbit"]["ok"] and by_name["average: largest error within 19 deg"]["ok"]
     assert by_name["average: largest error within 19 deg"]["here"] == pytest.approx(9.17, abs=0.005)
+    maps = coverage_object(*mapped[0][:3])
+    assert maps["wavg_ideal"]["mean_deg"] == pytest.approx(23.84, abs=0.005)
+    assert maps["wavg_warped"]["mean_deg"] == pytest.approx(23.87, abs=0.005)
     pages = {name: (folder / name).read_text(encoding="utf-8") for name in ("index.html", "calibration.html")}
     for page in pages.values():
         for file in {part.split('"')[0] for part in page.split('src="')[1:]}:

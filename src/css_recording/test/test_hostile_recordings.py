@@ -83,6 +83,17 @@ def test_a_chunk_of_nothing_ends_at_once_and_one_of_too_many_records_ends(monkey
         walk(RECORD_HEAD.pack(5, 21) + bytes(21) + message, lambda *_: None)
 
 
+def test_a_chunk_that_ends_within_a_record_is_refused_wherever_it_ends():
+    records = [RECORD_HEAD.pack(kind, size) + bytes(size) for kind, size in ((3, 14), (4, 8), (5, 22), (5, 29), (3, 3))]
+    whole, ends = b"".join(records), {sum(map(len, records[:n])) for n in range(len(records) + 1)}
+    for end in range(len(whole) + 1):
+        if end in ends:
+            walk(whole[:end], lambda *_: None)
+        else:
+            with pytest.raises(ChunkError, match="a record is cut short"):
+                walk(whole[:end], lambda *_: None)
+
+
 def foreign(path, messages, chunk_size=1 << 20):
     """A recording of the standard times, made by the library."""
     with path.open("wb") as file:

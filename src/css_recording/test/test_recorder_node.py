@@ -8,6 +8,7 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
@@ -131,6 +132,21 @@ def test_parameter_changes_are_recorded_and_first_values_are_not(flight, tmp_pat
     (event,) = [message for message in contents(tmp_path / "bag") if message[0] == "/parameter_events"]
     assert event[1] == voltages_of(flight, 1)[0][1]
     assert b"gain" in event[2]
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [({}, "/craft/logger"), ({"use_global_arguments": False}, "/recorder")],
+    ids=["alone", "composed"],
+)
+def test_names_of_the_command_line_are_those_of_a_recorder_with_a_process_of_its_own(tmp_path, options, name):
+    context = Context()
+    context.init(args=["--ros-args", "-r", "__ns:=/craft", "-r", "__node:=logger"])
+    recorder = RecorderNode(None, tmp_path / "bag", ["css/voltages"], context=context, **options)
+    assert recorder.get_fully_qualified_name() == name
+    recorder.close()
+    recorder.destroy_node()
+    context.try_shutdown()
 
 
 def test_a_recording_that_cannot_be_created_is_refused(flight, tmp_path, graph):

@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from spinning import FLIGHT, STEADY, motion_of, payload_values, sun_over_andoya
 
 from css_common.random_streams import random_key
+from css_msgs.msg import SlitPulse
 from css_sim.slit_crossings import LOWER, UPPER, VERTICAL, slit_crossings, slit_geometry
 from css_sim.slit_timer import SlitTimer, read_pulses
 from css_sim.spinning_payload import payload_state
@@ -24,6 +25,10 @@ def crossings(motion, geometry, start, end, room=4000):
     times, slits, heads = np.zeros(room), np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
     count = slit_crossings(motion, geometry, SUN_N, start, end, times, slits, heads)
     return times[:count], slits[:count], heads[:count]
+
+
+def test_slits_are_numbered_as_in_the_message():
+    assert (UPPER, VERTICAL, LOWER) == (SlitPulse.SLIT_UPPER, SlitPulse.SLIT_VERTICAL, SlitPulse.SLIT_LOWER)
 
 
 @settings(max_examples=40, deadline=None)
