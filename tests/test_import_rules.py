@@ -20,8 +20,8 @@ FLOORS = (
     {"css_bringup", "css_monte_carlo"},
     {"css_papers"},
 )
-# rooms inside css_estimation, and which others each may enter: an attitude filter needs to know the cells, the Sun filter
-# is a Sun estimator and gives an attitude
+# rooms inside css_estimation, and which others each may enter: an attitude filter needs to know the cells, the Sun
+# filter is a Sun estimator and gives an attitude
 WINGS = {"sun": set(), "spin": set(), "attitude": {"sun"}, "sun_filter": {"sun", "attitude"}}
 # inside a package, nodes and commands are the roof
 ROOFS = {"nodes", "commands"}

@@ -255,8 +255,10 @@ def _reported(p: SunFilterParameters, x, covariance, sun_n: Vec3, earth_known: b
     c = matmul(matmul(turn, theta), transpose(turn))
     lasting = p.earth.clouded_heading if earth_known else p.earth.unknown_heading
     systematic = _across(multiply(dcm_of(x), sun_n), lasting)
-    xx, yy, zz = min(c[0][0], _MOST), min(c[1][1], _MOST), min(c[2][2], _MOST)
-    xy, xz, yz = 0.5 * (c[0][1] + c[1][0]), 0.5 * (c[0][2] + c[2][0]), 0.5 * (c[1][2] + c[2][1])
+    # what is beyond a bound is cut as a whole, so that it stays a covariance
+    cut = min(1.0, _MOST / max(c[0][0], c[1][1], c[2][2], _MOST))
+    xx, yy, zz = cut * c[0][0], cut * c[1][1], cut * c[2][2]
+    xy, xz, yz = 0.5 * cut * (c[0][1] + c[1][0]), 0.5 * cut * (c[0][2] + c[2][0]), 0.5 * cut * (c[1][2] + c[2][1])
     return (
         xx + systematic[0], xy + systematic[1], xz + systematic[2],
         xy + systematic[1], yy + systematic[4], yz + systematic[5],
@@ -421,6 +423,17 @@ def _progress(
 
 
 @kernel
+def _finite(v: Vec3) -> bool:
+    return math.isfinite(v[0]) and math.isfinite(v[1]) and math.isfinite(v[2])
+
+
+@kernel
+def _heading_variance(covariance: Covariance) -> float:
+    """Mean variance of the two axes across the Sun line."""
+    return 0.5 * (covariance[0] + covariance[4] + covariance[8])
+
+
+@kernel
 def knows_earth(state: SunFilterState) -> bool:
     """Whether the light of the Earth is part of the state, and with it the turn about the Sun line."""
     return state.progress.stage == _STAGE_ROLL
@@ -458,13 +471,18 @@ def step(
         sun_b = unit(multiply(dcm_of(x), aiding.sky.sun_n))
         earth_known = progress.stage == _STAGE_ROLL
         covariance = _reported(p, x, memory.covariances[best], aiding.sky.sun_n, earth_known)
+        if not (_finite(sun_b) and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
+            # beyond what numbers can hold: nothing is known any more
+            progress, rate = _AFRESH, Rate(rate.model, _NO_RATE, _NO_RATE)
+            reading, mode = NOTHING_READ, MODE_COASTING
+            sun_b, covariance = state.found.sun_b, _across(state.found.sun_b, _MOST)
         used = reading.nis_dof > 0
         rate_source = RATE_SUN
         if cycle.model == RATE_BY_GYRO:
             rate_source = RATE_GYRO
         elif cycle.model == RATE_BY_MOMENTUM:
             rate_source = RATE_MOMENTUM
-        found = Found(sun_b, heading_sigma(memory.covariances[best], aiding.sky.sun_n) ** 2)
+        found = Found(sun_b, _MOST if progress.stage == _STAGE_SEARCH else _heading_variance(covariance))
     validity = state.validity
     if used:
         validity = VALIDITY_VALID
