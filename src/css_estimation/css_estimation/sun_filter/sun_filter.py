@@ -94,6 +94,7 @@ _CONTRARY_SHARE = 0.4
 _BETTER = 6.0
 _LOST = 1.0  # [rad] error of the heading beyond which there is no estimate
 _FULL_DISC = 0.99
+_SLOWEST_GAIN = 0.05
 _FIRST_NOISE, _FIRST_TIME = 0.1, 3.0  # [-], [s]
 _CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told to fade
 _MOST = 4.0  # [rad2] reported variance
@@ -159,7 +160,6 @@ class Cycle(NamedTuple):
     lit: bool  # cells may be used
     model: int  # RATE_BY_* of this cycle
     wheels_b: Vec3  # [N m s]
-    largest: float  # brightest output [-]
 
 
 _AFRESH = Progress(_STAGE_SEARCH, False, 0.0, 0.0, 0.0)
@@ -178,8 +178,11 @@ def initial_memory(p: SunFilterParameters) -> SunFilterMemory:
 
 
 def heading_gain(values: Values) -> float:
-    """Steady gain across the Sun line: the heading follows the rate, and cells correct it within seconds."""
-    return 0.05
+    """Gain across the Sun line of a cycle, for the check of the loop: a lag of two seconds at 10 Hz, more than it has.
+
+    The heading follows the rate at once; only what cells correct of it comes later.
+    """
+    return _SLOWEST_GAIN
 
 
 @kernel
@@ -454,7 +457,7 @@ def step(
     flux, lit = _sunlight(p, aiding, largest)
     eclipse_state, eclipse = detect_eclipse(p.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
     wheels_b, wheels_ok = wheel_momentum(p.motion, aiding)
-    cycle = Cycle(dt, flux, lit, rate_model(p.motion, gyro_usable(p.motion, aiding), wheels_ok), wheels_b, largest)
+    cycle = Cycle(dt, flux, lit, rate_model(p.motion, gyro_usable(p.motion, aiding), wheels_ok), wheels_b)
     reading, found = NOTHING_READ, state.found
     if state.progress.stage == _STAGE_SEARCH or dt > p.convergence.longest_step:
         if state.progress.stage != _STAGE_SEARCH:
