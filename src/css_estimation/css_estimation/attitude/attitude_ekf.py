@@ -60,6 +60,7 @@ from css_estimation.sun.error_covariance import (
     propagate,
     set_block,
 )
+from css_estimation.sun.sun_tracking import is_body_rate
 from css_estimation.symmetric import isotropic, trace
 
 # Trace of the attitude covariance [rad^2] beyond which a fresh start is better: 33 deg for each axis.
@@ -146,9 +147,7 @@ def step(
 
 @kernel
 def _gyro_usable(p: AttitudeParameters, gyro_b: Vec3, gyro_valid: bool) -> bool:
-    limit = p.gyro_limit
-    # a NaN compares false
-    return p.use_gyro and gyro_valid and abs(gyro_b[0]) <= limit and abs(gyro_b[1]) <= limit and abs(gyro_b[2]) <= limit
+    return p.use_gyro and gyro_valid and is_body_rate(gyro_b, p.gyro_limit)
 
 
 @kernel

@@ -115,13 +115,16 @@ def elapsed(dt: float) -> float:
 
 
 @kernel
+def is_body_rate(gyro_b: Vec3, limit: float) -> bool:
+    """True when what a gyro says [rad/s] is a number on each axis, and not beyond a limit."""
+    # a NaN compares false
+    return abs(gyro_b[0]) <= limit and abs(gyro_b[1]) <= limit and abs(gyro_b[2]) <= limit
+
+
+@kernel
 def gyro_usable(p: TrackingParameters, aiding: Aiding) -> bool:
     """True when the gyro may be used and its reading is one."""
-    if not (p.use_gyro and aiding.gyro_valid):
-        return False
-    x, y, z = aiding.gyro_b
-    # a NaN compares false
-    return abs(x) <= p.gyro_limit and abs(y) <= p.gyro_limit and abs(z) <= p.gyro_limit
+    return p.use_gyro and aiding.gyro_valid and is_body_rate(aiding.gyro_b, p.gyro_limit)
 
 
 @kernel

@@ -23,7 +23,7 @@ from css_estimation.attitude.attitude_solution import (
 from css_estimation.sun.sun_heading import Aiding
 from css_estimation.sun_filter import options, sun_filter
 from css_estimation.sun_filter.hypotheses import the_only_one
-from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, SunFilterMemory, dcm_of, triple
+from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, SunFilterMemory, attitude_block, dcm_of, triple
 from css_estimation.sun_filter.motion import RATE_BY_GYRO
 from css_estimation.sun_filter.sun_filter import MODE_EARTH, SunFilter, SunFilterState, knows_earth
 
@@ -51,8 +51,7 @@ def initial_memory(p: SunFilter) -> EarthlightMemory:
 def _write_covariance(p: SunFilter, x, covariance, by_gyro: bool, out) -> None:
     """Covariance in b; without gyro that of its bias is what it was at the start."""
     dcm_bn = dcm_of(x)
-    theta = triple(covariance[THETA], THETA), triple(covariance[THETA + 1], THETA), triple(covariance[THETA + 2], THETA)
-    attitude = matmul(matmul(dcm_bn, theta), transpose(dcm_bn))
+    attitude = matmul(matmul(dcm_bn, attitude_block(covariance)), transpose(dcm_bn))
     for i in range(3):
         for j in range(3):
             out[i, j] = 0.5 * (attitude[i][j] + attitude[j][i])

@@ -82,7 +82,9 @@ def begin(
     cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
     forget(covariance, GAIN, cells, p.errors.cell)
-    follow_only(m, 0)
+    m.weights[0] = 0.0
+    for other in range(1, HYPOTHESES):
+        m.weights[other] = DEAD
 
 
 @kernel
@@ -92,16 +94,6 @@ def _copy(m: SunFilterMemory, source: int, target: int) -> None:
     for i in range(m.covariances.shape[1]):
         for j in range(m.covariances.shape[2]):
             m.covariances[target, i, j] = m.covariances[source, i, j]
-
-
-@kernel
-def follow_only(m: SunFilterMemory, k: int) -> None:
-    """Makes one hypothesis the first and only one."""
-    if k != 0:
-        _copy(m, k, 0)
-    m.weights[0] = 0.0
-    for other in range(1, HYPOTHESES):
-        m.weights[other] = DEAD
 
 
 @kernel

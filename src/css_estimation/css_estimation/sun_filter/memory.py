@@ -89,6 +89,12 @@ def triple(a, first: int) -> Vec3:
 
 
 @kernel
+def attitude_block(covariance) -> Mat3:
+    """Covariance of THETA."""
+    return triple(covariance[THETA], THETA), triple(covariance[THETA + 1], THETA), triple(covariance[THETA + 2], THETA)
+
+
+@kernel
 def forget(covariance, first: int, count: int, variance: float) -> None:
     """Makes some states uncorrelated with all others and each other, with a given variance."""
     for i in range(first, first + count):

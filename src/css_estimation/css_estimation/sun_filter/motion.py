@@ -15,6 +15,7 @@ from css_common.kernel import kernel
 from css_common.matrices import IDENTITY, scaled, skew, sum_of
 from css_common.vectors import Mat3, Vec3, matmul, multiply, scale, subtract, transpose
 from css_estimation.sun.sun_heading import Aiding
+from css_estimation.sun.sun_tracking import is_body_rate
 from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, dcm_of, forget, set_dcm, triple
 from css_estimation.sun_filter.options import Motion
 
@@ -30,9 +31,7 @@ _TURN_NOISE = 1e-14  # [rad2/s]
 @kernel
 def gyro_usable(p: Motion, aiding: Aiding) -> bool:
     """True when the gyro may be used and its reading is one."""
-    x, y, z = aiding.gyro_b
-    limit = p.gyro_limit
-    return p.use_gyro and aiding.gyro_valid and abs(x) <= limit and abs(y) <= limit and abs(z) <= limit
+    return p.use_gyro and aiding.gyro_valid and is_body_rate(aiding.gyro_b, p.gyro_limit)
 
 
 @kernel

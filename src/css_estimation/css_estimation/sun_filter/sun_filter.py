@@ -21,9 +21,9 @@ from typing import NamedTuple
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.declared import builder
 from css_common.kernel import kernel
-from css_common.matrices import IDENTITY, skew
+from css_common.matrices import IDENTITY
 from css_common.schema import Values
-from css_common.vectors import Vec3, matmul, multiply, scale, transpose, unit
+from css_common.vectors import Vec3, matmul, multiply, scale, unit
 from css_estimation.sun import eclipse_detector
 from css_estimation.sun.eclipse_detector import EclipseState, detect_eclipse
 from css_estimation.sun.low_pass import low_pass, low_pass_gain
@@ -37,7 +37,6 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_NONE,
     VALIDITY_VALID,
     Aiding,
-    Covariance,
     SunHeading,
 )
 from css_estimation.sun.sun_tracking import elapsed
@@ -52,7 +51,6 @@ from css_estimation.sun_filter.memory import (
     GAIN,
     HYPOTHESES,
     SCALE,
-    THETA,
     X_EARTH,
     X_GAIN,
     X_SCALE,
@@ -74,6 +72,7 @@ from css_estimation.sun_filter.motion import (
     wheel_momentum,
 )
 from css_estimation.sun_filter.options import SunFilterParameters
+from css_estimation.sun_filter.reported import LARGEST, across, heading_covariance, mean_variance
 from css_estimation.sun_filter.sun_search import cost, least_cost, search
 
 MODE_WAITING = 0
@@ -97,7 +96,6 @@ _FULL_DISC = 0.99
 _SLOWEST_GAIN = 0.05
 _FIRST_NOISE, _FIRST_TIME = 0.1, 3.0  # [-], [s]
 _CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told to fade
-_MOST = 4.0  # [rad2] reported variance
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
 
 PARAMETERS = options.PARAMETERS
@@ -236,37 +234,6 @@ def _filtered_rate(p: SunFilterParameters, rate: Rate, cycle: Cycle, raw_b: Vec3
     if cycle.model == RATE_BY_GYRO:
         omega_bn_b = low_pass(rate.omega_bn_b, raw_b, low_pass_gain(p.motion.cutoff, cycle.dt))
     return Rate(cycle.model, raw_b, omega_bn_b)
-
-
-@kernel
-def _across(sun: Vec3, variance: float) -> Covariance:
-    """Equal variance on both axes across the Sun line, row-major."""
-    x, y, z = sun
-    return (
-        variance * (1.0 - x * x), -variance * x * y, -variance * x * z,
-        -variance * x * y, variance * (1.0 - y * y), -variance * y * z,
-        -variance * x * z, -variance * y * z, variance * (1.0 - z * z),
-    )  # fmt: skip
-
-
-@kernel
-def _reported(p: SunFilterParameters, x, covariance, sun_n: Vec3, earth_known: bool) -> Covariance:
-    """Covariance of the heading in b, row-major."""
-    # ds_b = dcm_bn (s x theta)
-    turn = matmul(dcm_of(x), skew(sun_n))
-    theta = triple(covariance[THETA], THETA), triple(covariance[THETA + 1], THETA), triple(covariance[THETA + 2], THETA)
-    c = matmul(matmul(turn, theta), transpose(turn))
-    lasting = p.earth.clouded_heading if earth_known else p.earth.unknown_heading
-    systematic = _across(multiply(dcm_of(x), sun_n), lasting)
-    # what is beyond a bound is cut as a whole, so that it stays a covariance
-    cut = min(1.0, _MOST / max(c[0][0], c[1][1], c[2][2], _MOST))
-    xx, yy, zz = cut * c[0][0], cut * c[1][1], cut * c[2][2]
-    xy, xz, yz = 0.5 * cut * (c[0][1] + c[1][0]), 0.5 * cut * (c[0][2] + c[2][0]), 0.5 * cut * (c[1][2] + c[2][1])
-    return (
-        xx + systematic[0], xy + systematic[1], xz + systematic[2],
-        xy + systematic[1], yy + systematic[4], yz + systematic[5],
-        xz + systematic[2], yz + systematic[5], zz + systematic[8],
-    )  # fmt: skip
 
 
 @kernel
@@ -431,12 +398,6 @@ def _finite(v: Vec3) -> bool:
 
 
 @kernel
-def _heading_variance(covariance: Covariance) -> float:
-    """Mean variance of the two axes across the Sun line."""
-    return 0.5 * (covariance[0] + covariance[4] + covariance[8])
-
-
-@kernel
 def knows_earth(state: SunFilterState) -> bool:
     """Whether the light of the Earth is part of the state, and with it the turn about the Sun line."""
     return state.progress.stage == _STAGE_ROLL
@@ -463,7 +424,7 @@ def step(
         if state.progress.stage != _STAGE_SEARCH:
             state = SunFilterState(_AFRESH, state.rate, _NOT_FOUND, state.validity, state.age, state.eclipse)
         progress, rate, found = _search(p, state, memory, cycle, voltages, aiding)
-        sun_b, covariance = found.sun_b, _across(found.sun_b, min(found.variance, _MOST))
+        sun_b, covariance = found.sun_b, across(found.sun_b, min(found.variance, LARGEST))
         mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
         if lit:
             reading = CellReading(0.0, 0, _readable(voltages), 0, 0, 0.0, 0.0)
@@ -473,19 +434,19 @@ def step(
         x = memory.estimates[best]
         sun_b = unit(multiply(dcm_of(x), aiding.sky.sun_n))
         earth_known = progress.stage == _STAGE_ROLL
-        covariance = _reported(p, x, memory.covariances[best], aiding.sky.sun_n, earth_known)
+        covariance = heading_covariance(p, x, memory.covariances[best], aiding.sky.sun_n, earth_known)
         if not (_finite(sun_b) and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
             # beyond what numbers can hold: nothing is known any more
             progress, rate = _AFRESH, Rate(rate.model, _NO_RATE, _NO_RATE)
             reading, mode = NOTHING_READ, MODE_COASTING
-            sun_b, covariance = state.found.sun_b, _across(state.found.sun_b, _MOST)
+            sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
         used = reading.nis_dof > 0
         rate_source = RATE_SUN
         if cycle.model == RATE_BY_GYRO:
             rate_source = RATE_GYRO
         elif cycle.model == RATE_BY_MOMENTUM:
             rate_source = RATE_MOMENTUM
-        found = Found(sun_b, _MOST if progress.stage == _STAGE_SEARCH else _heading_variance(covariance))
+        found = Found(sun_b, LARGEST if progress.stage == _STAGE_SEARCH else mean_variance(covariance))
     validity = state.validity
     if used:
         validity = VALIDITY_VALID
