@@ -11,6 +11,7 @@ import math
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, axes_across, matmul, multiply_transposed, scale
+from css_estimation.sun_filter.calibration import begin_calibration
 from css_estimation.sun_filter.memory import (
     DEAD,
     EARTH,
@@ -82,6 +83,7 @@ def begin(
     cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
     forget(covariance, GAIN, cells, p.errors.cell)
+    begin_calibration(p.calibration, cells, x, covariance)
     m.weights[0] = 0.0
     for other in range(1, HYPOTHESES):
         m.weights[other] = DEAD

@@ -15,6 +15,8 @@ from css_environment.albedo import Screen, plane_screen
 from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import EclipseParameters
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
+from css_estimation.sun_filter import calibration_options
+from css_estimation.sun_filter.calibration_options import Calibration, lasting_error
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
 """One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
@@ -100,11 +102,6 @@ def _inverse_inertia(values: Values) -> Mat3:
     return mat3(np.linalg.inv(np.array(_inertia(values))))
 
 
-def _lasting(gain: float, tilt_deg: float) -> float:
-    """Variance of a cell's output relative to its own, by gain and by a tilt where that matters most, at 60 deg."""
-    return gain**2 + (math.tan(math.radians(60.0)) * math.radians(tilt_deg)) ** 2
-
-
 class Response(NamedTuple):
     """Output of a cell over the light that it receives."""
 
@@ -129,16 +126,11 @@ class CellErrors(NamedTuple):
     )
     scale_time: float = given(real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9))
     cell: float = made(
-        _lasting,
-        real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", low=0.0, high=1.0),
-        real(
-            "tilt_sigma_deg",
-            0.1,
-            "deg",
-            "lasting error of each cell's normal about an axis, 1 sigma",
-            low=0.0,
-            high=45.0,
-        ),
+        lasting_error,
+        calibration_options.MODE,
+        calibration_options.GAIN_SIGMA,
+        calibration_options.TILT_SIGMA,
+        calibration_options.RESIDUAL,
     )
     cell_time: float = given(
         real(
@@ -280,6 +272,7 @@ class SunFilterParameters(NamedTuple):
     cos_half_view: float = computed(_cos_half_view)
     response: Response = part(Response)
     errors: CellErrors = part(CellErrors)
+    calibration: Calibration = part(Calibration)
     earth: EarthErrors = part(EarthErrors)
     motion: Motion = part(Motion)
     convergence: Convergence = part(Convergence)

@@ -41,9 +41,10 @@ from css_estimation.sun.sun_heading import (
 )
 from css_estimation.sun.sun_tracking import elapsed
 from css_estimation.sun_filter import options
+from css_estimation.sun_filter.calibration import states_in_use
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
-from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, weigh
+from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, the_only_one, weigh
 from css_estimation.sun_filter.memory import (
     DEAD,
     DIRECTIONS,
@@ -172,7 +173,7 @@ def initial_state(p: SunFilterParameters) -> SunFilterState:
 
 def initial_memory(p: SunFilterParameters) -> SunFilterMemory:
     """Room for all hypotheses."""
-    return new_memory(len(p.cells))
+    return new_memory(len(p.cells), p.calibration.per_cell)
 
 
 def heading_gain(values: Values) -> float:
@@ -268,12 +269,12 @@ def _search(
 
 
 @kernel
-def _forget_slowly(p: SunFilterParameters, dt: float, states: int, x, covariance) -> None:
+def _forget_slowly(p: SunFilterParameters, dt: float, states: int, earth_known: bool, x, covariance) -> None:
     """Errors of outputs and Earth go on."""
     cells = p.cells.shape[0]
     fade(SCALE, X_SCALE, 1, p.errors.scale_time, p.errors.scale, dt, states, x, covariance)
     fade(GAIN, X_GAIN, cells, p.errors.cell_time, p.errors.cell, dt, states, x, covariance)
-    if states > GAIN + cells:
+    if earth_known:
         fade(EARTH, X_EARTH, 1, p.earth.scale_time, p.earth.scale, dt, states, x, covariance)
         fade(GAIN + cells, X_GAIN + cells, cells, p.earth.clouds_time, 1.0, dt, states, x, covariance)
 
@@ -304,7 +305,7 @@ def _track(
     sun_n, dt = aiding.sky.sun_n, cycle.dt
     cells = p.cells.shape[0]
     earth_known = before.stage == _STAGE_ROLL
-    states = GAIN + (2 * cells if earth_known else cells)
+    states = states_in_use(p.calibration, cells, earth_known)
     faded, use = before.faded, cycle.lit
     best, left = 0, 1
     reading, raw_b = NOTHING_READ, _NO_RATE
@@ -315,7 +316,7 @@ def _track(
         if cycle.model != state.rate.model:
             change_rate(p.motion, state.rate.model, cycle.model, state.rate.raw_b, cycle.wheels_b, x, covariance)
         omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, dt, states, x, covariance)
-        _forget_slowly(p, dt, states, x, covariance)
+        _forget_slowly(p, dt, states, earth_known, x, covariance)
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
@@ -325,6 +326,9 @@ def _track(
         use = faded == 0.0
     if use:
         more_noise = 0.0 if earth_known else p.earth.unknown**2 + _start_noise(before.since)
+        learns = p.calibration.estimated and earth_known and before.since > abs(p.calibration.after)
+        if p.calibration.after < 0.0:
+            learns = learns and the_only_one(memory) >= 0
         for k in range(HYPOTHESES):
             if memory.weights[k] <= DEAD:
                 continue
@@ -338,6 +342,7 @@ def _track(
                 cycle.flux,
                 more_noise,
                 earth_known,
+                learns,
                 aiding.sky.light,
                 states,
                 x,

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Gain and normal of each cell as states of the Sun filter: calibration in flight.
+
+Cell i has the gain gain_i (1 + g_i) and the normal n_i = unit(n0_i + a_i e1_i + b_i e2_i), e1 and e2 across the normal
+of the mission. g, a and b are constants, known before the flight to `gain_sigma` and `tilt_sigma_deg`. Estimated, they
+are corrected with all else; considered (Schmidt), they keep value and variance, and what they have in common with the
+other states keeps the error bars true. While the Earth is unknown its light would be taken for gains: they are then
+considered in any case.
+"""
+
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, dot
+from css_estimation.sun.cell_calibration import tilted_normal
+from css_estimation.sun_filter.calibration_options import Calibration
+from css_estimation.sun_filter.memory import GAIN, X_GAIN, forget
+
+PER_CELL = 3
+"""States of each cell: gain and two tilts."""
+
+_LEAST_GAIN, _LARGEST_GAIN = -0.9, 2.0
+_LARGEST_TILT = 0.5
+
+
+@kernel
+def first_state(cells: int) -> int:
+    """Index of the first state of calibration."""
+    return GAIN + 2 * cells
+
+
+@kernel
+def states_in_use(p: Calibration, cells: int, earth_known: bool) -> int:
+    """How many of the states the filter works with; those of calibration come behind the Earth's."""
+    if p.per_cell > 0:
+        return GAIN + (2 + p.per_cell) * cells
+    return GAIN + (2 * cells if earth_known else cells)
+
+
+@kernel
+def corrected_states(cells: int, states: int, learns: bool) -> int:
+    """How many of the states in use are corrected; the others are considered."""
+    return states if learns else min(states, first_state(cells))
+
+
+@kernel
+def begin_calibration(p: Calibration, cells: int, x, covariance) -> None:
+    """As known before the flight."""
+    if p.per_cell == 0:
+        return
+    for i in range(cells):
+        at = first_state(cells) + PER_CELL * i
+        for k in range(PER_CELL):
+            x[at - GAIN + X_GAIN + k] = 0.0
+        forget(covariance, at, 1, p.gain)
+        forget(covariance, at + 1, 2, p.tilt)
+
+
+@kernel
+def calibrated(cells: int, i: int, x, normal_b: Vec3, sun_b: Vec3) -> tuple[float, float, float, float]:
+    """Of cell i: gain relative to the mission's, cosine of the Sun, and its derivatives to the two tilts."""
+    at = X_GAIN + 2 * cells + PER_CELL * i
+    n, e1, e2 = tilted_normal(normal_b, x[at + 1], x[at + 2])
+    return 1.0 + x[at], dot(n, sun_b), dot(e1, sun_b), dot(e2, sun_b)
+
+
+@kernel
+def correct_calibration(p: Calibration, cells: int, x, correction) -> None:
+    """Adds corrections; gains and tilts stay within what a cell can have."""
+    if p.per_cell == 0:
+        return
+    for i in range(cells):
+        at = X_GAIN + 2 * cells + PER_CELL * i
+        by = first_state(cells) + PER_CELL * i
+        x[at] = min(max(x[at] + correction[by], _LEAST_GAIN), _LARGEST_GAIN)
+        for k in range(1, PER_CELL):
+            x[at + k] = min(max(x[at + k] + correction[by + k], -_LARGEST_TILT), _LARGEST_TILT)
