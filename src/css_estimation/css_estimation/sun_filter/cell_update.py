@@ -202,7 +202,10 @@ def read_cells(
         innovation -= by_scale * correction[SCALE] + expected * correction[COMMON] + by_gain * correction[GAIN + i]
         if earth_known:
             innovation -= by_earth * correction[EARTH] + by_cloud * correction[cloud_state]
-        by_relative = cell.gain * (1.0 + x[X_GAIN + i]) * scale_now * output
+        # the Sun alone calibrates: how bright the Earth is on a cell nobody knows so well
+        by_relative = cell.gain * (1.0 + x[X_GAIN + i]) * scale_now * output if seen else 0.0
+        if calibrates and not seen:
+            by_scale = 0.0
         by_tilt1 *= slope * flux if seen else 0.0
         by_tilt2 *= slope * flux if seen else 0.0
         if calibrates:
