@@ -7,6 +7,7 @@ import numpy as np
 
 from css_common.schema import Table, Values, integers, real, reals
 from css_environment.albedo import Screen, plane_screen, soft_screen
+from css_sensors.cells import plane_sides
 
 PARAMETERS: Table = (
     reals("collar.axis", (0.0, 0.0, 0.0), "-", "axis of a collar around some cells, in b; zeros: none", length=3),
@@ -14,9 +15,6 @@ PARAMETERS: Table = (
     real("collar.full_deg", 28.0, "deg", "light within this angle of the axis passes whole", low=0.0, high=90.0),
     real("collar.dark_deg", 44.9, "deg", "light beyond this angle is hidden, with a linear edge", low=0.0, high=90.0),
 )
-
-# A normal this close to the body plane lies in it: rounding must not hide half of such a cell's view.
-_IN_PLANE = 1e-9
 
 
 def screen(values: Values) -> Screen:
@@ -33,8 +31,7 @@ def cell_sides(values: Values) -> np.ndarray:
         side = np.zeros(len(values.cells.normals))
         side[values.collar.cells] = 1.0
         return side
-    side = values.cells.normals @ values.cells.clip_normal
-    return np.where(np.abs(side) < _IN_PLANE, 0.0, side)
+    return plane_sides(values)
 
 
 def conflicts(values: Values) -> Iterator[str]:
