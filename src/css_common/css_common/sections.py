@@ -24,26 +24,58 @@ _LONGEST_NAME = 100  # [bytes] with what is added to it a file name of 255 bytes
 _MOST_STEPS = 10**9
 _LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
+EPOCH = text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step")
+DURATION = real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7)
+PERIOD = real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0)
+SEED = integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1)
+CASE = integer("mission.case", 0, "-", "case number within the seed", low=0, high=2**32 - 1)
+
 MISSION: Table = (
     text("mission.name", "unnamed", "name of the mission, as in the file name"),
     text("mission.description", "", "one line for reports"),
-    text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step"),
-    real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7),
-    real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0),
-    integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1),
-    integer("mission.case", 0, "-", "case number within the seed", low=0, high=2**32 - 1),
+    EPOCH,
+    DURATION,
+    PERIOD,
+    SEED,
+    CASE,
+)
+
+ORBIT_SOURCE = choice(
+    "orbit.source",
+    "none",
+    ("none", "elements", "tle", "ballistic"),
+    "what defines the orbit",
+    example="orbit: {source: elements, altitude: 400.0e+3, inclination_deg: 51.6}",
+)
+ALTITUDE = real("orbit.altitude", 0.0, "m", "semi-major axis above the equatorial radius", low=0.0, high=1e9)
+ECCENTRICITY = real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9)
+LAUNCH_LATITUDE = real(
+    "orbit.launch.latitude_deg",
+    69.29,
+    "deg",
+    "geodetic latitude where a ballistic arc begins",
+    low=-90.0,
+    high=90.0,
+)
+LAUNCH_LONGITUDE = real("orbit.launch.longitude_deg", 16.02, "deg", "its longitude, east", low=-180.0, high=360.0)
+LAUNCH_HEIGHT = real("orbit.launch.height", 0.0, "m", "its height above the ellipsoid", low=-500.0, high=100e3)
+LAUNCH_AZIMUTH = real(
+    "orbit.launch.azimuth_deg",
+    330.0,
+    "deg",
+    "direction of the arc's start from north over east",
+    low=-360.0,
+    high=360.0,
+)
+LAUNCH_ELEVATION = real("orbit.launch.elevation_deg", 80.0, "deg", "its elevation", low=10.0, high=90.0)
+LAUNCH_APOGEE = real(
+    "orbit.launch.apogee", 169e3, "m", "height of its apogee above the ellipsoid", low=1e3, high=2000e3
 )
 
 ORBIT: Table = (
-    choice(
-        "orbit.source",
-        "none",
-        ("none", "elements", "tle", "ballistic"),
-        "what defines the orbit",
-        example="orbit: {source: elements, altitude: 400.0e+3, inclination_deg: 51.6}",
-    ),
-    real("orbit.altitude", 0.0, "m", "semi-major axis above the equatorial radius", low=0.0, high=1e9),
-    real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9),
+    ORBIT_SOURCE,
+    ALTITUDE,
+    ECCENTRICITY,
     real("orbit.inclination_deg", 0.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
     real("orbit.raan_deg", 0.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
     real("orbit.argument_of_perigee_deg", 0.0, "deg", "argument of perigee", low=-360.0, high=360.0),
@@ -51,65 +83,70 @@ ORBIT: Table = (
     flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
     text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
     text("orbit.tle_line2", "", "second line of the element set"),
-    real(
-        "orbit.launch.latitude_deg",
-        69.29,
-        "deg",
-        "geodetic latitude where a ballistic arc begins",
-        low=-90.0,
-        high=90.0,
-    ),
-    real("orbit.launch.longitude_deg", 16.02, "deg", "its longitude, east", low=-180.0, high=360.0),
-    real("orbit.launch.height", 0.0, "m", "its height above the ellipsoid", low=-500.0, high=100e3),
-    real(
-        "orbit.launch.azimuth_deg",
-        330.0,
-        "deg",
-        "direction of the arc's start from north over east",
-        low=-360.0,
-        high=360.0,
-    ),
-    real("orbit.launch.elevation_deg", 80.0, "deg", "its elevation", low=10.0, high=90.0),
-    real("orbit.launch.apogee", 169e3, "m", "height of its apogee above the ellipsoid", low=1e3, high=2000e3),
+    LAUNCH_LATITUDE,
+    LAUNCH_LONGITUDE,
+    LAUNCH_HEIGHT,
+    LAUNCH_AZIMUTH,
+    LAUNCH_ELEVATION,
+    LAUNCH_APOGEE,
 )
+
+INERTIA = reals(
+    "spacecraft.inertia",
+    (),
+    "kg m^2",
+    "inertia matrix about the centre of mass, wheels included, row-major",
+    length=9,
+    columns=3,
+    example="spacecraft: {inertia: [10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75]}",
+)
+ARRAY_NORMAL = reals("spacecraft.array_normal", (0.0, 0.0, 1.0), "-", "normal of the solar arrays in b", length=3)
 
 SPACECRAFT: Table = (
-    reals(
-        "spacecraft.inertia",
-        (),
-        "kg m^2",
-        "inertia matrix about the centre of mass, wheels included, row-major",
-        length=9,
-        columns=3,
-        example="spacecraft: {inertia: [10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75]}",
-    ),
-    reals("spacecraft.array_normal", (0.0, 0.0, 1.0), "-", "normal of the solar arrays in b", length=3),
+    INERTIA,
+    ARRAY_NORMAL,
 )
+
+WHEELS_FITTED = flag(
+    "wheels.fitted", True, "the spacecraft carries reaction wheels; without them it flies uncontrolled"
+)
+WHEEL_AXES = reals(
+    "wheels.axes",
+    (),
+    "-",
+    "spin axes of the reaction wheels in b, one row of x, y, z each",
+    columns=3,
+    example="wheels: {axes: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
+)
+WHEEL_INERTIA = real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True)
+WHEEL_MAX_TORQUE = real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0)
+WHEEL_MAX_SPEED = real("wheels.max_speed_rpm", 6000.0, "rpm", "speed limit of each wheel", low=0.0)
 
 WHEELS: Table = (
-    flag("wheels.fitted", True, "the spacecraft carries reaction wheels; without them it flies uncontrolled"),
-    reals(
-        "wheels.axes",
-        (),
-        "-",
-        "spin axes of the reaction wheels in b, one row of x, y, z each",
-        columns=3,
-        example="wheels: {axes: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
-    ),
-    real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True),
-    real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0),
-    real("wheels.max_speed_rpm", 6000.0, "rpm", "speed limit of each wheel", low=0.0),
+    WHEELS_FITTED,
+    WHEEL_AXES,
+    WHEEL_INERTIA,
+    WHEEL_MAX_TORQUE,
+    WHEEL_MAX_SPEED,
 )
+
+RODS_FITTED = flag("rods.fitted", False, "the spacecraft carries magnetic torque rods")
+ROD_AXES = reals(
+    "rods.axes", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), "-", "rod axes in b, a row each", columns=3
+)
+ROD_MAX_DIPOLE = real("rods.max_dipole", 20.0, "A m^2", "dipole limit of each rod", low=0.0)
 
 RODS: Table = (
-    flag("rods.fitted", False, "the spacecraft carries magnetic torque rods"),
-    reals("rods.axes", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), "-", "rod axes in b, a row each", columns=3),
-    real("rods.max_dipole", 20.0, "A m^2", "dipole limit of each rod", low=0.0),
+    RODS_FITTED,
+    ROD_AXES,
+    ROD_MAX_DIPOLE,
 )
 
-MAGNETOMETER: Table = (
-    integer("magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000),
+FIELD_DIVIDER = integer(
+    "magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000
 )
+
+MAGNETOMETER: Table = (FIELD_DIVIDER,)
 
 MEASURES: Table = (
     real(
@@ -206,7 +243,7 @@ def name_for_files(text: str) -> str:
 
 def wheel_axes(values: Values) -> np.ndarray:
     """Spin axes (N, 3) of the reaction wheels that the spacecraft carries, in b; none without wheels."""
-    return values.wheels.axes if values.wheels.fitted else np.zeros((0, 3))
+    return values[WHEEL_AXES] if values[WHEELS_FITTED] else np.zeros((0, 3))
 
 
 def _wheels_conflicts(wheels: Values) -> Iterator[str]:

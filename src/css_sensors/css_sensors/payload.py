@@ -7,52 +7,65 @@ import numpy as np
 
 from css_common.schema import Table, Values, real, reals
 
+AXIS_AZIMUTH = real(
+    "payload.axis_azimuth_deg",
+    330.0,
+    "deg",
+    "angular momentum at the epoch, from north over east",
+    low=-360.0,
+    high=360.0,
+)
+AXIS_ELEVATION = real("payload.axis_elevation_deg", 80.0, "deg", "its elevation", low=-90.0, high=90.0)
+PHASE_STARTS = reals(
+    "payload.phase_starts",
+    (0.0,),
+    "s",
+    "when a phase of torque-free motion begins, after the epoch",
+    low=0.0,
+    high=1e5,
+)
+SPIN = reals("payload.spin_hz", (5.45,), "Hz", "turns a second relative to the Sun in each phase", low=0.01, high=50.0)
+CONING_PERIOD = reals(
+    "payload.coning_period",
+    (0.2618,),
+    "s",
+    "turn of the spin axis about the angular momentum in each phase",
+    low=0.01,
+    high=1e3,
+)
+CONING_ANGLE = reals(
+    "payload.coning_angle_deg",
+    (12.89,),
+    "deg",
+    "full angle of the cone of the spin axis in each phase",
+    low=0.0,
+    high=120.0,
+)
+FINAL_CONING_PERIOD = real(
+    "payload.final_coning_period",
+    0.0,
+    "s",
+    "to which the period of the last phase drifts by its end; 0: it stays",
+    low=0.0,
+    high=1e3,
+)
+FLAT_SPIN_START = real(
+    "payload.flat_spin_start", 1e5, "s", "when the cone of the last phase begins to open", low=0.0, high=1e5
+)
+FLAT_SPIN_RATE = real("payload.flat_spin_rate_deg_s", 4.0, "deg/s", "growth of its half angle", low=0.1, high=90.0)
+FLAT_SPIN_ANGLE = real("payload.flat_spin_angle_deg", 85.0, "deg", "half angle at which it ends", low=1.0, high=89.9)
+
 PAYLOAD: Table = (
-    real(
-        "payload.axis_azimuth_deg",
-        330.0,
-        "deg",
-        "angular momentum at the epoch, from north over east",
-        low=-360.0,
-        high=360.0,
-    ),
-    real("payload.axis_elevation_deg", 80.0, "deg", "its elevation", low=-90.0, high=90.0),
-    reals(
-        "payload.phase_starts",
-        (0.0,),
-        "s",
-        "when a phase of torque-free motion begins, after the epoch",
-        low=0.0,
-        high=1e5,
-    ),
-    reals("payload.spin_hz", (5.45,), "Hz", "turns a second relative to the Sun in each phase", low=0.01, high=50.0),
-    reals(
-        "payload.coning_period",
-        (0.2618,),
-        "s",
-        "turn of the spin axis about the angular momentum in each phase",
-        low=0.01,
-        high=1e3,
-    ),
-    reals(
-        "payload.coning_angle_deg",
-        (12.89,),
-        "deg",
-        "full angle of the cone of the spin axis in each phase",
-        low=0.0,
-        high=120.0,
-    ),
-    real(
-        "payload.final_coning_period",
-        0.0,
-        "s",
-        "to which the period of the last phase drifts by its end; 0: it stays",
-        low=0.0,
-        high=1e3,
-    ),
-    real("payload.flat_spin_start", 1e5, "s", "when the cone of the last phase begins to open", low=0.0, high=1e5),
-    real("payload.flat_spin_rate_deg_s", 4.0, "deg/s", "growth of its half angle", low=0.1, high=90.0),
-    real("payload.flat_spin_angle_deg", 85.0, "deg", "half angle at which it ends", low=1.0, high=89.9),
+    AXIS_AZIMUTH,
+    AXIS_ELEVATION,
+    PHASE_STARTS,
+    SPIN,
+    CONING_PERIOD,
+    CONING_ANGLE,
+    FINAL_CONING_PERIOD,
+    FLAT_SPIN_START,
+    FLAT_SPIN_RATE,
+    FLAT_SPIN_ANGLE,
 )
 
 

@@ -19,25 +19,32 @@ TIMER_SPAN = 2**32
 
 _HALF_SPAN = TIMER_SPAN // 2
 
+COUNTER = real("slits.counter_hz", 1e6, "Hz", "frequency of the timer", low=1e3, high=1e9)
+INCLINATION = real(
+    "slits.inclination_deg", 30.0, "deg", "of the two slanted slits to the spin axis", low=5.0, high=85.0
+)
+FIELD_OF_VIEW = real(
+    "slits.field_of_view_deg",
+    120.0,
+    "deg",
+    "range of Sun angles over which a slit is lit, about the equator",
+    low=2.0,
+    high=179.0,
+)
+HEAD_AZIMUTHS = reals(
+    "slits.head_azimuths_deg",
+    (0.0,),
+    "deg",
+    f"places of the sensor heads around the spin axis, at most {MOST_HEADS}",
+    low=-360.0,
+    high=360.0,
+)
+
 SLITS: Table = (
-    real("slits.counter_hz", 1e6, "Hz", "frequency of the timer", low=1e3, high=1e9),
-    real("slits.inclination_deg", 30.0, "deg", "of the two slanted slits to the spin axis", low=5.0, high=85.0),
-    real(
-        "slits.field_of_view_deg",
-        120.0,
-        "deg",
-        "range of Sun angles over which a slit is lit, about the equator",
-        low=2.0,
-        high=179.0,
-    ),
-    reals(
-        "slits.head_azimuths_deg",
-        (0.0,),
-        "deg",
-        f"places of the sensor heads around the spin axis, at most {MOST_HEADS}",
-        low=-360.0,
-        high=360.0,
-    ),
+    COUNTER,
+    INCLINATION,
+    FIELD_OF_VIEW,
+    HEAD_AZIMUTHS,
 )
 
 
@@ -52,17 +59,17 @@ def conflicts(slits: Values) -> Iterator[str]:
 
 def timer_frequency(values: Values) -> float:
     """Frequency of the timer [Hz]."""
-    return float(values.slits.counter_hz)
+    return values[COUNTER]
 
 
 def slit_inclination(values: Values) -> float:
     """Inclination of the slanted slits to the spin axis [rad]."""
-    return math.radians(values.slits.inclination_deg)
+    return math.radians(values[INCLINATION])
 
 
 def head_azimuths(values: Values) -> list[float]:
     """Places of the heads around the spin axis [rad]."""
-    azimuths: list[float] = np.radians(values.slits.head_azimuths_deg).tolist()
+    azimuths: list[float] = np.radians(values[HEAD_AZIMUTHS]).tolist()
     return azimuths
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, multiply
-from css_sensors.slits import SLITS_PER_HEAD, head_azimuths, slit_inclination
+from css_sensors.slits import FIELD_OF_VIEW, SLITS_PER_HEAD, head_azimuths, slit_inclination
 from css_sim.spinning_payload import PayloadMotion, payload_state
 
 _LARGEST_TURN = 0.2  # [rad] between two looks: no slit is crossed twice in it, unless the Sun leaves the view there
@@ -38,7 +38,7 @@ def slit_geometry(values: Values) -> SlitGeometry:
         np.cos(azimuths),
         np.sin(azimuths),
         math.tan(slit_inclination(values)),
-        math.sin(math.radians(0.5 * values.slits.field_of_view_deg)),
+        math.sin(math.radians(0.5 * values[FIELD_OF_VIEW])),
     )
 
 

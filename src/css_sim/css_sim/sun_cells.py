@@ -29,6 +29,10 @@ from css_sensors.cells import half_view_cosine
 from css_sim import cell_screen
 from css_sim.cell_faults import apply_faults
 
+NOISE = real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0)
+OUTPUT_LOW = real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0)
+OUTPUT_HIGH = real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0)
+
 
 def _levels(bits: int) -> float:
     return float(2**bits) if bits else 0.0
@@ -47,10 +51,10 @@ class SunCells(NamedTuple):
         lambda word: word == "per_cell",
         choice("degradation_mode", "common", ("common", "per_cell"), "one draw for all cells, or one for each"),
     )
-    noise: float = given(real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0))
+    noise: float = given(NOISE)
     dropout: float = given(real("dropout", 0.0, "-", "light below this level gives no output", low=0.0, high=1.0))
-    output_low: float = given(real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0))
-    output_high: float = given(real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0))
+    output_low: float = given(OUTPUT_LOW)
+    output_high: float = given(OUTPUT_HIGH)
     levels: float = made(  # steps between lowest and highest output; 0: continuous
         _levels,
         integer("bits", 0, "-", "resolution between lowest and highest output; 0: continuous", low=0, high=32),
