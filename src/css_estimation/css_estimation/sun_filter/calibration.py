@@ -5,18 +5,20 @@ Cell i has the gain gain_i (1 + g_i) and the normal n_i = unit(n0_i + a_i e1_i +
 of the mission. g, a and b are constants, known before the flight to `gain_sigma` and `tilt_sigma_deg`. Estimated, they
 are corrected with all else; considered (Schmidt), they keep value and variance, and what they have in common with the
 other states keeps the error bars true. While the Earth is unknown its light would be taken for gains: they are then
-considered in any case.
+considered in any case, and for as long as a wrong turn about the Sun line, or the corrections to it, may mislead.
 """
 
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot
 from css_estimation.sun.cell_calibration import tilted_normal
 from css_estimation.sun_filter.calibration_options import Calibration
-from css_estimation.sun_filter.memory import GAIN, X_GAIN, forget
+from css_estimation.sun_filter.memory import GAIN, HYPOTHESES, X_GAIN, SunFilterMemory, forget
 
 PER_CELL = 3
 """States of each cell: gain and two tilts."""
 
+# So long [s] after the turns about the Sun line have begun to be looked for, errors about it have not settled.
+_SETTLED = 120.0
 _LEAST_GAIN, _LARGEST_GAIN = -0.9, 2.0
 _LARGEST_TILT = 0.5
 
@@ -42,6 +44,28 @@ def corrected_states(cells: int, states: int, learns: bool) -> int:
 
 
 @kernel
+def calibrates_now(p: Calibration, since: float) -> bool:
+    """Whether the states of calibration are corrected, `since` [s] of light with the Earth known."""
+    return p.estimated and since > _SETTLED
+
+
+@kernel
+def keep_calibration(p: Calibration, cells: int, m: SunFilterMemory) -> None:
+    """Keeps what the likeliest hypothesis knows of the cells for the one that comes after a new search."""
+    best = 0
+    for k in range(HYPOTHESES):
+        if m.weights[k] > m.weights[best]:
+            best = k
+    if best == 0:
+        return
+    for s in range(PER_CELL * cells if p.per_cell > 0 else 0):
+        i = first_state(cells) + s
+        m.estimates[0, X_GAIN - GAIN + i] = m.estimates[best, X_GAIN - GAIN + i]
+        for j in range(first_state(cells), m.covariances.shape[1]):
+            m.covariances[0, i, j] = m.covariances[best, i, j]
+
+
+@kernel
 def begin_calibration(p: Calibration, cells: int, x, covariance) -> None:
     """As known before the flight."""
     if p.per_cell == 0:
@@ -55,11 +79,11 @@ def begin_calibration(p: Calibration, cells: int, x, covariance) -> None:
 
 
 @kernel
-def calibrated(cells: int, i: int, x, normal_b: Vec3, sun_b: Vec3) -> tuple[float, float, float, float]:
-    """Of cell i: gain relative to the mission's, cosine of the Sun, and its derivatives to the two tilts."""
+def calibrated(cells: int, i: int, x, normal_b: Vec3, sun_b: Vec3) -> tuple[float, Vec3, float, float]:
+    """Of cell i: gain relative to the mission's, normal, and the derivatives of the Sun's cosine to its two tilts."""
     at = X_GAIN + 2 * cells + PER_CELL * i
-    n, e1, e2 = tilted_normal(normal_b, x[at + 1], x[at + 2])
-    return 1.0 + x[at], dot(n, sun_b), dot(e1, sun_b), dot(e2, sun_b)
+    tilted_b, e1, e2 = tilted_normal(normal_b, x[at + 1], x[at + 2])
+    return 1.0 + x[at], tilted_b, dot(e1, sun_b), dot(e2, sun_b)
 
 
 @kernel

@@ -5,7 +5,7 @@ import math
 from typing import NamedTuple
 
 from css_common.conversions import square, square_of_degrees
-from css_common.declared import given, made
+from css_common.declared import made
 from css_common.schema import choice, real
 
 MODE = choice(
@@ -54,5 +54,4 @@ class Calibration(NamedTuple):
     estimated: bool = made(lambda mode: mode == "estimate", MODE)
     gain: float = made(square, GAIN_SIGMA)
     tilt: float = made(square_of_degrees, TILT_SIGMA)  # [rad2]
-    after: float = given(real("calibration.after", 120.0, "s", "x", low=-1e6, high=1e6))
     margin: float = made(_margin, MODE, TILT_SIGMA)  # [rad] by which edges of views are uncertain

@@ -11,7 +11,6 @@ import math
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, axes_across, matmul, multiply_transposed, scale
-from css_estimation.sun_filter.calibration import begin_calibration
 from css_estimation.sun_filter.memory import (
     DEAD,
     EARTH,
@@ -32,7 +31,7 @@ from css_estimation.sun_filter.motion import begin_rate
 from css_estimation.sun_filter.options import SunFilterParameters
 
 # Outputs of one cycle to the next are alike in what the model has wrong: so much of each is news.
-_NEWS = 0.02
+_NEWS = 0.1
 # Logarithm of the weight, relative to the best, at which a hypothesis is given up.
 _GIVEN_UP = -12.0
 # Two hypotheses this near [rad] are one.
@@ -75,15 +74,15 @@ def begin(
     """One hypothesis from a direction of the Sun in b, known to a variance [rad2]; its turn is a definition."""
     x, covariance = m.estimates[0], m.covariances[0]
     set_dcm(x, onto_sun(sun_b, sun_n))
-    for i in range(X_RATE, x.shape[0]):
+    cells = p.cells.shape[0]
+    # the states of calibration behind these outlast a search
+    for i in range(X_RATE, X_GAIN + 2 * cells):
         x[i] = 0.0
-    forget(covariance, 0, covariance.shape[0], 0.0)
+    forget(covariance, 0, GAIN + 2 * cells, 0.0)
     _widen_across(covariance, sun_n, variance + _SEARCH_VARIANCE)
     begin_rate(p.motion, model, (0.0, 0.0, 0.0), p.motion.start_rate, wheels_b, x, covariance)
-    cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
     forget(covariance, GAIN, cells, p.errors.cell)
-    begin_calibration(p.calibration, cells, x, covariance)
     m.weights[0] = 0.0
     for other in range(1, HYPOTHESES):
         m.weights[other] = DEAD

@@ -23,7 +23,7 @@ from css_common.declared import builder
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
 from css_common.schema import Values
-from css_common.vectors import Vec3, matmul, multiply, scale, unit
+from css_common.vectors import Vec3, matmul, multiply, norm, scale, unit
 from css_estimation.sun import eclipse_detector
 from css_estimation.sun.eclipse_detector import EclipseState, detect_eclipse
 from css_estimation.sun.low_pass import low_pass, low_pass_gain
@@ -41,10 +41,15 @@ from css_estimation.sun.sun_heading import (
 )
 from css_estimation.sun.sun_tracking import elapsed
 from css_estimation.sun_filter import options
-from css_estimation.sun_filter.calibration import states_in_use
+from css_estimation.sun_filter.calibration import (
+    begin_calibration,
+    calibrates_now,
+    keep_calibration,
+    states_in_use,
+)
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
-from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, the_only_one, weigh
+from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, weigh
 from css_estimation.sun_filter.memory import (
     DEAD,
     DIRECTIONS,
@@ -73,7 +78,8 @@ from css_estimation.sun_filter.motion import (
     wheel_momentum,
 )
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.sun_filter.reported import LARGEST, across, heading_covariance, mean_variance
+from css_estimation.sun_filter.reported import LARGEST, across, mean_variance
+from css_estimation.sun_filter.reported import heading as heading_of
 from css_estimation.sun_filter.sun_search import cost, least_cost, search
 
 MODE_WAITING = 0
@@ -173,7 +179,9 @@ def initial_state(p: SunFilterParameters) -> SunFilterState:
 
 def initial_memory(p: SunFilterParameters) -> SunFilterMemory:
     """Room for all hypotheses."""
-    return new_memory(len(p.cells), p.calibration.per_cell)
+    memory = new_memory(len(p.cells), p.calibration.per_cell)
+    begin_calibration.py_func(p.calibration, len(p.cells), memory.estimates[0], memory.covariances[0])
+    return memory
 
 
 def heading_gain(values: Values) -> float:
@@ -269,14 +277,17 @@ def _search(
 
 
 @kernel
-def _forget_slowly(p: SunFilterParameters, dt: float, states: int, earth_known: bool, x, covariance) -> None:
-    """Errors of outputs and Earth go on."""
+def _forget_slowly(
+    p: SunFilterParameters, dt: float, rate: float, states: int, earth_known: bool, x, covariance
+) -> None:
+    """Errors of outputs and Earth go on; on a body that turns [rad/s] a cell soon looks at other clouds."""
     cells = p.cells.shape[0]
     fade(SCALE, X_SCALE, 1, p.errors.scale_time, p.errors.scale, dt, states, x, covariance)
     fade(GAIN, X_GAIN, cells, p.errors.cell_time, p.errors.cell, dt, states, x, covariance)
     if earth_known:
         fade(EARTH, X_EARTH, 1, p.earth.scale_time, p.earth.scale, dt, states, x, covariance)
-        fade(GAIN + cells, X_GAIN + cells, cells, p.earth.clouds_time, 1.0, dt, states, x, covariance)
+        clouds_time = 1.0 / (1.0 / p.earth.clouds_time + rate / p.earth.clouds_angle)
+        fade(GAIN + cells, X_GAIN + cells, cells, clouds_time, 1.0, dt, states, x, covariance)
 
 
 @kernel
@@ -299,8 +310,8 @@ def _lost(p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3,
 @kernel
 def _track(
     p: SunFilterParameters, state: SunFilterState, memory: SunFilterMemory, cycle: Cycle, voltages, aiding: Aiding
-) -> tuple[Progress, Rate, CellReading, int, int]:
-    """A cycle with an estimate; gives too what the best hypothesis read, its number, and the mode."""
+) -> tuple[Progress, Rate, CellReading, int]:
+    """A cycle with an estimate; gives too what the best hypothesis read, and the mode."""
     before = state.progress
     sun_n, dt = aiding.sky.sun_n, cycle.dt
     cells = p.cells.shape[0]
@@ -316,7 +327,7 @@ def _track(
         if cycle.model != state.rate.model:
             change_rate(p.motion, state.rate.model, cycle.model, state.rate.raw_b, cycle.wheels_b, x, covariance)
         omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, dt, states, x, covariance)
-        _forget_slowly(p, dt, states, earth_known, x, covariance)
+        _forget_slowly(p, dt, norm(omega_b), states, earth_known, x, covariance)
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
@@ -326,9 +337,7 @@ def _track(
         use = faded == 0.0
     if use:
         more_noise = 0.0 if earth_known else p.earth.unknown**2 + _start_noise(before.since)
-        learns = p.calibration.estimated and earth_known and before.since > abs(p.calibration.after)
-        if p.calibration.after < 0.0:
-            learns = learns and the_only_one(memory) >= 0
+        learns = earth_known and calibrates_now(p.calibration, before.since)
         for k in range(HYPOTHESES):
             if memory.weights[k] <= DEAD:
                 continue
@@ -354,7 +363,7 @@ def _track(
                 reading = read
         best, left = give_up(memory)
     progress, mode = _progress(p, before, memory, best, left, cycle, use, faded, reading, voltages, aiding)
-    return progress, _filtered_rate(p, state.rate, cycle, raw_b), reading, best, mode
+    return progress, _filtered_rate(p, state.rate, cycle, raw_b), reading, mode
 
 
 @kernel
@@ -428,6 +437,8 @@ def step(
     if state.progress.stage == _STAGE_SEARCH or dt > p.convergence.longest_step:
         if state.progress.stage != _STAGE_SEARCH:
             state = SunFilterState(_AFRESH, state.rate, _NOT_FOUND, state.validity, state.age, state.eclipse)
+            # cells are what they were; so much cannot be said of an estimate that is dropped for being wrong
+            keep_calibration(p.calibration, p.cells.shape[0], memory)
         progress, rate, found = _search(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = found.sun_b, across(found.sun_b, min(found.variance, LARGEST))
         mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
@@ -435,16 +446,15 @@ def step(
             reading = CellReading(0.0, 0, _readable(voltages), 0, 0, 0.0, 0.0)
         rate_source = RATE_GYRO if cycle.model == RATE_BY_GYRO else RATE_NONE
     else:
-        progress, rate, reading, best, mode = _track(p, state, memory, cycle, voltages, aiding)
-        x = memory.estimates[best]
-        sun_b = unit(multiply(dcm_of(x), aiding.sky.sun_n))
-        earth_known = progress.stage == _STAGE_ROLL
-        covariance = heading_covariance(p, x, memory.covariances[best], aiding.sky.sun_n, earth_known)
+        progress, rate, reading, mode = _track(p, state, memory, cycle, voltages, aiding)
+        sun_b, covariance = heading_of(p, memory, aiding.sky.sun_n, progress.stage == _STAGE_ROLL)
         if not (_finite(sun_b) and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
             # beyond what numbers can hold: nothing is known any more
             progress, rate = _AFRESH, Rate(rate.model, _NO_RATE, _NO_RATE)
             reading, mode = NOTHING_READ, MODE_COASTING
             sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
+        if progress.stage == _STAGE_SEARCH:
+            begin_calibration(p.calibration, p.cells.shape[0], memory.estimates[0], memory.covariances[0])
         used = reading.nis_dof > 0
         rate_source = RATE_SUN
         if cycle.model == RATE_BY_GYRO:
