@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from css_common.conversions import square, square_of_degrees
 from css_common.declared import made
-from css_common.schema import choice, real
+from css_common.schema import Values, choice, real
 
 MODE = choice(
     "calibration.mode",
@@ -33,14 +33,14 @@ RESIDUAL = real(
 )
 
 
-def lasting_error(mode: str, gain: float, tilt_deg: float, residual: float) -> float:
-    """Variance of a cell's output relative to its own beside what is calibrated in flight.
+def lasting_error(values: Values) -> float:
+    """Variance of a cell's output relative to its own: by what the states of calibration leave of its error.
 
-    Without that by gain and by a tilt where it matters most, at 60 deg.
+    Without them by its gain and by a tilt where that matters most, at 60 deg.
     """
-    if mode != "off":
-        return residual**2
-    return gain**2 + (math.tan(math.radians(60.0)) * math.radians(tilt_deg)) ** 2
+    if values[MODE] != "off":
+        return values[RESIDUAL] ** 2
+    return values[GAIN_SIGMA] ** 2 + (math.tan(math.radians(60.0)) * math.radians(values[TILT_SIGMA])) ** 2
 
 
 def _margin(mode: str, tilt_deg: float) -> float:

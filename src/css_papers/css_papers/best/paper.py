@@ -8,6 +8,7 @@ import pyarrow as pa
 
 from css_common.mission import load_mission
 from css_monte_carlo.study import run_study
+from css_papers.best.calibration import calibration_section
 from css_papers.best.scenarios import FILTER, Scenario, scenarios
 from css_papers.page import Listing, Page, Section, Table, write_page
 from css_papers.papers import Request
@@ -24,6 +25,7 @@ _COLUMNS = (
     ("heading error, sunlit [deg]", "heading_error_mean_deg"),
     ("95 % [deg]", "heading_error_p95_deg"),
     ("from the first light on [deg]", "heading_error_sunlit_deg"),
+    ("late [deg]", "heading_error_late_deg"),
     ("in eclipse [deg]", "heading_error_eclipse_deg"),
     ("minute after it [deg]", "heading_error_dawn_deg"),
     ("NEES / 2 (1)", "nees_mean"),
@@ -54,6 +56,7 @@ def reproduce(request: Request) -> list[Row]:
     sections = [
         Section("Numbers", [summary, Table(*table_of(rows)), Listing(notes_of(rows))]),
         Section("All scenarios", [Table(heading, lines)]),
+        *([] if request.quick else [calibration_section()]),
         Section("What is measured", [Listing(_DEFINITIONS)]),
     ]
     if spent:
@@ -70,6 +73,7 @@ def reproduce(request: Request) -> list[Row]:
 _DEFINITIONS = (
     "heading error, sunlit: mean over the cases of the mean over sunlight after acquisition; 95 %: mean of percentiles",
     "from the first light on: the same with the search for the Sun",
+    "late: the mean over the last 5 min of sunlight; after a calibration, over all sunlight after its manoeuvre",
     "NEES: mean over the whole flight, eclipse included, across the Sun line, for each of two degrees of freedom",
     "NIS: normalised innovations squared for each degree of freedom, over the steps that had some",
     "NEES below its range: error bars too wide, as in eclipse without gyro for a torque that this truth does not have",
@@ -85,9 +89,7 @@ def _rows(scenario: Scenario, cases: pa.Table) -> list[Row]:
         values = {name: column(cases, scenario.configuration(gyro), name) for _, name in _COLUMNS}
         label, variant = scenario.label, "gyro" if gyro else "no gyro"
         must = None if scenario.error_must is None else Must(None, scenario.error_must)
-        error = row(
-            f"{label}: heading error", "deg", None, _mean(values["heading_error_mean_deg"]), must, variant=variant
-        )
+        error = row(f"{label}: heading error", "deg", None, _mean(values[scenario.error]), must, variant=variant)
         rows.append(error)
         if must is None:
             continue
