@@ -12,7 +12,7 @@ from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot
 from css_estimation.sun.cell_calibration import tilted_normal
 from css_estimation.sun_filter.calibration_options import Calibration
-from css_estimation.sun_filter.memory import GAIN, HYPOTHESES, X_GAIN, SunFilterMemory, forget
+from css_estimation.sun_filter.memory import DEAD, GAIN, HYPOTHESES, X_GAIN, SunFilterMemory, forget
 
 PER_CELL = 3
 """States of each cell: gain and two tilts."""
@@ -50,22 +50,6 @@ def calibrates_now(p: Calibration, since: float) -> bool:
 
 
 @kernel
-def keep_calibration(p: Calibration, cells: int, m: SunFilterMemory) -> None:
-    """Keeps what the likeliest hypothesis knows of the cells for the one that comes after a new search."""
-    best = 0
-    for k in range(HYPOTHESES):
-        if m.weights[k] > m.weights[best]:
-            best = k
-    if best == 0:
-        return
-    for s in range(PER_CELL * cells if p.per_cell > 0 else 0):
-        i = first_state(cells) + s
-        m.estimates[0, X_GAIN - GAIN + i] = m.estimates[best, X_GAIN - GAIN + i]
-        for j in range(first_state(cells), m.covariances.shape[1]):
-            m.covariances[0, i, j] = m.covariances[best, i, j]
-
-
-@kernel
 def begin_calibration(p: Calibration, cells: int, x, covariance) -> None:
     """As known before the flight."""
     if p.per_cell == 0:
@@ -76,6 +60,29 @@ def begin_calibration(p: Calibration, cells: int, x, covariance) -> None:
             x[at - GAIN + X_GAIN + k] = 0.0
         forget(covariance, at, 1, p.gain)
         forget(covariance, at + 1, 2, p.tilt)
+
+
+@kernel
+def outlast_estimate(p: Calibration, cells: int, m: SunFilterMemory, trusted: bool) -> None:
+    """Leaves to the next estimate what is known of the cells, when the present one is dropped.
+
+    Args:
+        trusted: it is dropped for another reason than that it is wrong; else cells are as known before the flight.
+    """
+    best = 0
+    for k in range(HYPOTHESES):
+        if m.weights[k] > m.weights[best]:
+            best = k
+    if not trusted:
+        begin_calibration(p, cells, m.estimates[0], m.covariances[0])
+    elif p.per_cell > 0 and best > 0:
+        for i in range(first_state(cells), m.covariances.shape[1]):
+            m.estimates[0, X_GAIN - GAIN + i] = m.estimates[best, X_GAIN - GAIN + i]
+            for j in range(first_state(cells), m.covariances.shape[1]):
+                m.covariances[0, i, j] = m.covariances[best, i, j]
+    m.weights[0] = 0.0
+    for other in range(1, HYPOTHESES):
+        m.weights[other] = DEAD
 
 
 @kernel

@@ -44,7 +44,7 @@ from css_estimation.sun_filter import options
 from css_estimation.sun_filter.calibration import (
     begin_calibration,
     calibrates_now,
-    keep_calibration,
+    outlast_estimate,
     states_in_use,
 )
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
@@ -437,8 +437,7 @@ def step(
     if state.progress.stage == _STAGE_SEARCH or dt > p.convergence.longest_step:
         if state.progress.stage != _STAGE_SEARCH:
             state = SunFilterState(_AFRESH, state.rate, _NOT_FOUND, state.validity, state.age, state.eclipse)
-            # cells are what they were; so much cannot be said of an estimate that is dropped for being wrong
-            keep_calibration(p.calibration, p.cells.shape[0], memory)
+            outlast_estimate(p.calibration, p.cells.shape[0], memory, True)
         progress, rate, found = _search(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = found.sun_b, across(found.sun_b, min(found.variance, LARGEST))
         mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
@@ -454,7 +453,7 @@ def step(
             reading, mode = NOTHING_READ, MODE_COASTING
             sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
         if progress.stage == _STAGE_SEARCH:
-            begin_calibration(p.calibration, p.cells.shape[0], memory.estimates[0], memory.covariances[0])
+            outlast_estimate(p.calibration, p.cells.shape[0], memory, False)
         used = reading.nis_dof > 0
         rate_source = RATE_SUN
         if cycle.model == RATE_BY_GYRO:
