@@ -6,6 +6,7 @@ import pytest
 
 from css_common.mission import load_mission
 from css_papers.best import paper
+from css_papers.best.calibration import calibrated_cells
 from css_papers.best.layouts import layouts
 from css_papers.best.scenarios import FILTER, Scenario, scenarios
 from css_papers.papers import Request, find_paper
@@ -27,6 +28,17 @@ def test_layouts_reach_the_mission():
         mission = Scenario(name, layout.settings).configuration(True).applied(load_mission("okeefe_sun_filter"))
         np.testing.assert_array_equal(np.asarray(mission.values.cells.normals).reshape(-1, 3), layout.normals)
         assert mission.values.cells.field_of_view_deg == layout.field_of_view_deg
+
+
+def test_the_calibration_says_what_it_told_at_the_end_of_its_manoeuvre():
+    """Before the cells are calibrated nothing has been told, and everything has its name and its error bar."""
+    mission = load_mission("okeefe_calibration")
+    assert max(event.time for event in mission.events) == 1300.0
+    report = calibrated_cells(mission.with_overrides(["mission.duration=40"]))
+    assert len(report) == 3 * 8 + 4
+    assert not any(row.observable for row in report)
+    assert {row.prior for row in report if row.name.endswith("gain")} == {2.0}
+    assert all(row.sigma == pytest.approx(row.prior) for row in report)
 
 
 def test_a_short_flight_gives_a_page(tmp_path, monkeypatch):
