@@ -48,7 +48,7 @@ def scenarios() -> list[Scenario]:
         _of_the_paper("ekf", "the paper's filter (ekf)", _CLOUDS),
         _of_the_paper("wavg", "the paper's average (wavg)", _CLOUDS),
         Scenario("gains 2 %, tilts 1 deg, uncalibrated", _UNCALIBRATED | _TOLD | _calibrated("consider"), 1.3),
-        Scenario("the same, after a calibration in flight", {}, 0.6, mission=CALIBRATION, error=_AFTERWARDS),
+        Scenario("the same, calibrated in flight by a manoeuvre", {}, 0.6, mission=CALIBRATION, error=_AFTERWARDS),
         Scenario(
             "the same, calibrated without a manoeuvre", _UNCALIBRATED | _TOLD | _calibrated("estimate"), side=True
         ),
