@@ -16,7 +16,8 @@ from css_estimation.sun.sun_heading import UNAIDED
 from css_estimation.sun_filter import sun_filter
 from css_estimation.sun_filter.calibration_report import calibration_line, calibration_report, calibration_states
 from css_estimation.sun_filter.cell_update import read_cells
-from css_estimation.sun_filter.memory import COMMON, GAIN, SCALE, X_GAIN, X_SCALE, dcm_of, set_dcm
+from css_estimation.sun_filter.hypotheses import earth_is_elsewhere
+from css_estimation.sun_filter.memory import COMMON, DEAD, GAIN, SCALE, X_GAIN, X_SCALE, dcm_of, set_dcm
 
 CELLS = 8
 FIRST = GAIN + 2 * CELLS
@@ -35,7 +36,7 @@ def parameters(**changes):
 
 
 class Uncalibrated(SunFilterFlight):
-    """Cells whose gains and normals are not those that the filter was told; Earth, clouds and noise err as it expects."""
+    """Cells whose gains and normals nobody told the filter; Earth, clouds and noise err as it expects."""
 
     def __init__(self, seed, **changes):
         super().__init__((0.1, 0.3, 0.95), TUMBLING, seed, white=0.006, earth=(1.0, 0.4, 0.3), **(ESTIMATED | changes))
@@ -154,7 +155,8 @@ def test_a_reading_of_all_cells_is_the_kalman_filter_s_or_schmidt_s(learns):
 
 def test_gains_and_tilts_are_found_within_their_error_bars():
     squares, largest = [], 0.0
-    for seed in range(3):
+    # the last of them begins with a wrong turn about the Sun line
+    for seed in (0, 1, 7):
         flight = Uncalibrated(seed)
         flight.manoeuvre()
         states, covariance = calibration_states(flight.p, flight.memory)
@@ -201,6 +203,25 @@ def test_a_gap_keeps_the_calibration_and_a_wrong_estimate_loses_it():
     states, covariance = calibration_states(flight.p, flight.memory)
     np.testing.assert_array_equal(states, 0.0)
     assert covariance[0, 0] == pytest.approx(0.02**2)
+
+
+def test_clouds_that_are_none_make_the_turn_be_looked_for_again_and_the_calibration_doubted():
+    flight = Uncalibrated(2)
+    flight.fly(150.0, gyro=True)
+    memory = flight.memory
+    best = int(np.argmax(memory.weights))
+    clouds = memory.estimates[best, X_GAIN + CELLS : X_GAIN + 2 * CELLS]
+    assert not earth_is_elsewhere(flight.p, memory.estimates[best])
+    memory.weights[:] = np.where(np.arange(len(memory.weights)) == best, 0.0, DEAD)
+    clouds[:] = [5.0, -5.0] * (CELLS // 2)
+    assert earth_is_elsewhere(flight.p, memory.estimates[best])
+    learnt, _ = calibration_states(flight.p, memory)
+    heading = flight.step(gyro=True)
+    assert heading.mode == sun_filter.MODE_EARTH
+    assert np.all(memory.weights > DEAD), "all turns are possible again"
+    states, covariance = calibration_states(flight.p, memory)
+    np.testing.assert_allclose(states, learnt, atol=0.005)
+    np.testing.assert_array_equal(covariance, np.diag(np.tile([0.02**2, *[math.radians(1.0) ** 2] * 2], CELLS)))
 
 
 def flight_aiding(flight):

@@ -54,10 +54,18 @@ def begin_calibration(p: Calibration, cells: int, x, covariance) -> None:
     """As known before the flight."""
     if p.per_cell == 0:
         return
+    for i in range(first_state(cells), covariance.shape[0]):
+        x[i - GAIN + X_GAIN] = 0.0
+    doubt_calibration(p, cells, covariance)
+
+
+@kernel
+def doubt_calibration(p: Calibration, cells: int, covariance) -> None:
+    """As uncertain as before the flight, the values being the best there are."""
+    if p.per_cell == 0:
+        return
     for i in range(cells):
         at = first_state(cells) + PER_CELL * i
-        for k in range(PER_CELL):
-            x[at - GAIN + X_GAIN + k] = 0.0
         forget(covariance, at, 1, p.gain)
         forget(covariance, at + 1, 2, p.tilt)
 

@@ -7,7 +7,8 @@ The model of cell i with the normal n_i,
     light_i = flux max(0, n_i.s) seen_i + a_i (1 + EARTH) + c a_i u_i,
 
 R being the response, a_i the light of the mean Earth at the estimated attitude, u_i what clouds add to it in units of
-c a_i, gain_i and n_i those of `calibration` where cells are calibrated in flight. Where the Earth is not predicted a_i is half of its largest, and its error is white noise.
+c a_i, gain_i and n_i those of `calibration` where cells are calibrated in flight. Where the Earth is not predicted a_i
+is half of its largest, and its error is white noise.
 
 Which cells see the Sun follows from the estimate. Its error decides for which of them that is sure: of the others, next
 to the edge of a view, those enter that are too bright for an Earth. A reading that the model explains worse than

@@ -11,6 +11,7 @@ import math
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, axes_across, matmul, multiply_transposed, scale
+from css_estimation.sun_filter.calibration import doubt_calibration
 from css_estimation.sun_filter.memory import (
     DEAD,
     EARTH,
@@ -36,6 +37,8 @@ _NEWS = 0.1
 _GIVEN_UP = -12.0
 # Two hypotheses this near [rad] are one.
 _ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
+# Mean square of the states of the clouds, 1 for clouds, beyond which they are none.
+_NO_CLOUDS = 8.0
 # Errors of a new hypothesis [rad2]: about the Sun line, and across it what the unknown Earth may have done.
 _ROLL_VARIANCE = 0.2**2
 _HEADING_VARIANCE = 0.05**2
@@ -117,6 +120,29 @@ def look_for_roll(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3) -> No
         _turn(m.covariances[k], turn)
     for k in range(HYPOTHESES):
         m.weights[k] = 0.0
+
+
+@kernel
+def earth_is_elsewhere(p: SunFilterParameters, x) -> bool:
+    """Whether clouds would have to be what no clouds are, for the Earth to be where an estimate has it.
+
+    Their states are in units of their standard deviation. What they make up for is then a wrong turn about the Sun
+    line.
+    """
+    cells = p.cells.shape[0]
+    squares = 0.0
+    for i in range(X_GAIN + cells, X_GAIN + 2 * cells):
+        squares += x[i] * x[i]
+    return squares > _NO_CLOUDS * cells
+
+
+@kernel
+def look_again(p: SunFilterParameters, m: SunFilterMemory, best: int, sun_n: Vec3) -> None:
+    """Looks for the turn anew, from the attitude of a hypothesis; what it has learnt of the cells is in doubt."""
+    if best != 0:
+        _copy(m, best, 0)
+    doubt_calibration(p.calibration, p.cells.shape[0], m.covariances[0])
+    look_for_roll(p, m, sun_n)
 
 
 @kernel

@@ -49,7 +49,15 @@ from css_estimation.sun_filter.calibration import (
 )
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
-from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, weigh
+from css_estimation.sun_filter.hypotheses import (
+    begin,
+    earth_is_elsewhere,
+    give_up,
+    look_again,
+    look_for_roll,
+    loosen,
+    weigh,
+)
 from css_estimation.sun_filter.memory import (
     DEAD,
     DIRECTIONS,
@@ -403,6 +411,9 @@ def _progress(
     if use and aiding.sky.known and converged and sigma * sigma < p.convergence.roll_variance:
         look_for_roll(p, memory, sun_n)
         stage, since = _STAGE_ROLL, 0.0
+    elif stage == _STAGE_ROLL and left == 1 and p.calibration.per_cell > 0 and earth_is_elsewhere(p, x):
+        look_again(p, memory, best, sun_n)
+        since = 0.0
     return Progress(stage, True, since, contrary, faded), mode
 
 
