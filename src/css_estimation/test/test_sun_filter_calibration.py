@@ -252,6 +252,14 @@ def test_what_no_flight_tells_is_named():
     assert calibration_report(parameters(), sun_filter.initial_memory(parameters())) == []
 
 
+def test_cells_are_not_calibrated_by_an_earth_that_is_not_predicted():
+    orbit = {"orbit__source": "elements"}
+    estimated, considered = ESTIMATED | orbit, CONSIDERED | orbit | {"use_orbit": False}
+    for changes, refused in ((estimated, False), (estimated | {"use_orbit": False}, True), (considered, False)):
+        messages = list(sun_filter.conflicts(okeefe_values(SunFilter.table(), **changes)))
+        assert [message.startswith("calibration.mode: estimate given") for message in messages] == [True] * refused
+
+
 def test_a_turn_of_all_cells_is_told_with_its_sign():
     p = parameters(**ESTIMATED)
     memory = sun_filter.initial_memory(p)

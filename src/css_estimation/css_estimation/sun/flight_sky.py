@@ -57,9 +57,14 @@ class FlightSky:
         return Sky(True, predicted, e.sun_n, e.solar_flux, e.illumination, self._light)
 
 
+def knows_place(values: Values) -> bool:
+    """Whether an estimator with these values predicts the light of the Earth."""
+    return hasattr(values, "use_orbit") and values[USE_ORBIT] and values.orbit.source != "none"
+
+
 def flight_sky(values: Values) -> FlightSky | None:
     """The sky that a Sun estimator's values ask for; None when cells decide on eclipse and nobody needs the rest."""
-    uses_light = hasattr(values, "use_orbit") and values[USE_ORBIT] and values.orbit.source != "none"
+    uses_light = knows_place(values)
     if not uses_light and values.eclipse.source == "sensors":
         return None
     return FlightSky(values, uses_light)

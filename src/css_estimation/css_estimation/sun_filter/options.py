@@ -298,6 +298,11 @@ def conflicts(values: Values) -> Iterator[str]:
         yield f"{GAINS.name}: {np.min(values[GAINS]):g} given, expected gains above 0; a dead cell is left out as NaN"
     if len(values[NORMALS]) and np.any(np.linalg.norm(np.reshape(values[NORMALS], (-1, 3)), axis=1) < _NO_NORMAL):
         yield f"{NORMALS.name}: a row of zeros given, expected normals"
+    if values[calibration_options.MODE] == "estimate" and not flight_sky.knows_place(values):
+        yield (
+            f"{calibration_options.MODE.name}: estimate given, but the place in orbit is not known, and the light of "
+            "the Earth would be taken for gains; expected consider, or use_orbit and an orbit"
+        )
     if values[CURVE] == "table" and len(values[TABLE]) < _FEWEST:
         yield f"{TABLE.name}: {len(values[TABLE])} numbers given, but the curve is `table`; expected at least {_FEWEST}"
     if len(values.spacecraft.inertia):
