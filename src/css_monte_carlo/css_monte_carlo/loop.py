@@ -15,7 +15,7 @@ from css_common.kernel import kernel, study_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply, row
 from css_environment.albedo_vector import PATCHES, point_source
-from css_estimation.sun.sun_heading import Aiding, Sky
+from css_estimation.sun.sun_heading import Aiding
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
@@ -130,9 +130,7 @@ def fly_block(
             if read.field_valid:
                 field_b, field_step = read.field_b, step
             wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
-            known, predicted, sun_n, solar_flux, illumination = sky_at(around.sky, k)
-            sky_light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
-            sky = Sky(known, predicted, sun_n, solar_flux, illumination, sky_light)
+            sky = sky_at(around.sky, around.sky_light, k)
             field_is_new = v.heading_hears_field and read.field_valid
             aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
             heading_state, heading = estimate_heading(
