@@ -46,7 +46,13 @@ ORBIT: Table = (
     real("orbit.raan_deg", 0.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
     real("orbit.argument_of_perigee_deg", 0.0, "deg", "argument of perigee", low=-360.0, high=360.0),
     real("orbit.true_anomaly_deg", 0.0, "deg", "true anomaly at the epoch", low=-360.0, high=360.0),
-    flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
+    choice(
+        "orbit.model",
+        "secular",
+        ("secular", "j2_integrated"),
+        "elements that stand still or drift evenly, or motion from them integrated under J2, short periods included",
+    ),
+    flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2, of the secular model"),
     text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
     text("orbit.tle_line2", "", "second line of the element set"),
     real(
@@ -373,6 +379,8 @@ def _orbit_conflicts(orbit: Values) -> Iterator[str]:
         for key in ("tle_line1", "tle_line2"):
             if len(getattr(orbit, key)) != 69:
                 yield f"orbit.{key}: expected the 69 characters of a two-line element set"
+    if orbit.model == "j2_integrated" and orbit.source in ("tle", "ballistic"):
+        yield f"orbit.model: j2_integrated given with orbit.source {orbit.source}, expected elements as the source"
     if orbit.source != "elements":
         return
     if orbit.altitude < _LOWEST:

@@ -15,7 +15,7 @@ from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.magnetic_field import HIGHEST_DEGREE
-from css_environment.orbit import Orbit, TleOrbit, keplerian_orbit
+from css_environment.orbit import IntegratedOrbit, Orbit, TleOrbit, keplerian_orbit
 
 # Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
 _segment_tables = lru_cache(maxsize=4)(ephemeris.build_ephemeris)
@@ -46,7 +46,7 @@ def mission_orbit(values: Values) -> Orbit:
         return _arc(mission_launch(values), parse_utc(values.mission.epoch))
     if o.source == "tle":
         return TleOrbit(o.tle_line1, o.tle_line2)
-    return keplerian_orbit(
+    elements = keplerian_orbit(
         EARTH_RADIUS + o.altitude,
         o.eccentricity,
         o.inclination_deg,
@@ -55,13 +55,20 @@ def mission_orbit(values: Values) -> Orbit:
         o.true_anomaly_deg,
         o.j2,
     )
+    return IntegratedOrbit(elements) if o.model == "j2_integrated" else elements
 
 
 class MissionEnvironment:
     """Environment of the mission's `orbit` section."""
 
     def __init__(
-        self, values: Values, *, field: bool, conical_shadow: bool = True, field_degree: int = HIGHEST_DEGREE
+        self,
+        values: Values,
+        *,
+        field: bool,
+        conical_shadow: bool = True,
+        field_degree: int = HIGHEST_DEGREE,
+        orbit: Orbit | None = None,
     ) -> None:
         """Prepares the tables.
 
@@ -70,8 +77,9 @@ class MissionEnvironment:
             field: compute the geomagnetic field; else it is zero.
             conical_shadow: shape of the Earth's shadow, with a penumbra or a cylinder.
             field_degree: highest degree of the field's spherical harmonics.
+            orbit: None: that of the section.
         """
-        self._orbit = mission_orbit(values)
+        self._orbit = mission_orbit(values) if orbit is None else orbit
         self._epoch_ns = parse_utc(values.mission.epoch)
         self._field = field
         self._conical_shadow = conical_shadow

@@ -3,6 +3,7 @@
 
 import math
 from collections.abc import Iterator
+from copy import copy
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -34,6 +35,7 @@ from css_sim import (
     gyro,
     initial_conditions,
     magnetometer,
+    orbit_dispersion,
     sun_cells,
 )
 from css_sim.nodes.magnetometer import Magnetometer
@@ -61,7 +63,8 @@ class MissionFlight:
         mission: what flies.
         steps: control cycles of a flight.
         measure: how the estimator of interest is measured.
-        surroundings: the environment that all cases share.
+        own_orbit: cases differ in their orbits, and share neither `surroundings` nor `marks`.
+        surroundings: the environment that all cases share, or that of one case.
         marks: (steps,) what is special about each step, see `case_tallies.step_marks`.
     """
 
@@ -87,17 +90,31 @@ class MissionFlight:
         common = None
         if self._grid is not None:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
+        self._common_earth = common
+        self.own_orbit = orbit_dispersion.is_dispersed(self._plant.values)
+        self._surround(mission.values.mission.case)
+
+    def _surround(self, case: int) -> None:
+        """Takes the orbit of a case, which is that of all unless they are dispersed."""
+        plant = self._plant.values
         self.surroundings = SurroundingsTables(
-            self._plant.values,
+            plant,
             _values(self._heading),
             _values(self._filter),
-            common,
+            self._common_earth,
             self._own_earth,
             self._feels_field(),
-            MODELS[array.albedo.model],
+            MODELS[self._array.values.albedo.model],
+            orbit_dispersion.case_orbit(plant, self._key(case)),
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
-        self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
+        self.marks = step_marks(illumination, self.mission.period_ns * 1e-9, windows_of(self.mission))
+
+    def on_orbit_of(self, case: int) -> "MissionFlight":
+        """The same flights on the orbit of a case, where cases differ in theirs (`own_orbit`)."""
+        flight = copy(self)
+        flight._surround(case)
+        return flight
 
     @property
     def trace_columns(self) -> int:

@@ -63,6 +63,15 @@ VARIANTS = {
         "mrp_control.reference.acceleration_deg_s2=0.2",
         "mrp_control.reference.known_torque=0.001,0.0,0.0",
     ),
+    "a dispersed orbit, integrated for the truth alone": (
+        "css_array.albedo.draw=per_cell",
+        "dynamics.orbit.model=j2_integrated",
+        "dynamics.dispersion.orbit.altitude=500.0",
+        "dynamics.dispersion.orbit.inclination_deg=0.1",
+        "dynamics.dispersion.orbit.raan_deg=10.0",
+        "dynamics.dispersion.orbit.true_anomaly_deg=20.0",
+        "ekf.eclipse.source=model",
+    ),
     "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }

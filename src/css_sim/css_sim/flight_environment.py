@@ -3,6 +3,7 @@
 
 from css_common.schema import Table, Values, choice, flag
 from css_environment.mission_environment import MissionEnvironment
+from css_environment.orbit import Orbit
 
 PARAMETERS: Table = (
     choice("shadow", "conical", ("conical", "cylindrical"), "shape of the Earth's shadow"),
@@ -10,7 +11,12 @@ PARAMETERS: Table = (
 )
 
 
-def flight_environment(values: Values, field: bool = True) -> MissionEnvironment:
-    """The environment that `PARAMETERS` and the mission's orbit describe; `field=False` when nobody needs the field."""
+def flight_environment(values: Values, field: bool = True, orbit: Orbit | None = None) -> MissionEnvironment:
+    """The environment that `PARAMETERS` and the mission's orbit describe.
+
+    Args:
+        field: False when nobody needs the field.
+        orbit: of the case, where cases differ in theirs.
+    """
     field = field and values.geomagnetic_field
-    return MissionEnvironment(values, field=field, conical_shadow=values.shadow == "conical")
+    return MissionEnvironment(values, field=field, conical_shadow=values.shadow == "conical", orbit=orbit)

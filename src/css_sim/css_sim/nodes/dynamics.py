@@ -14,7 +14,7 @@ from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
-from css_sim import disturbances, flight_environment, initial_conditions
+from css_sim import disturbances, flight_environment, initial_conditions, orbit_dispersion
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
@@ -26,6 +26,7 @@ class Dynamics(Plant):
     shared = ("orbit", "spacecraft", "wheels", "rods", "lockstep")
     parameters = (
         *initial_conditions.PARAMETERS,
+        *orbit_dispersion.PARAMETERS,
         *flight_environment.PARAMETERS,
         *disturbances.PARAMETERS,
         integer(
@@ -73,6 +74,7 @@ class Dynamics(Plant):
     def conflicts(cls, values: Values) -> Iterable[str]:
         yield from disturbances.conflicts(values)
         yield from initial_conditions.conflicts(values)
+        yield from orbit_dispersion.conflicts(values)
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
@@ -86,7 +88,9 @@ class Dynamics(Plant):
         values = self.values
         key = random_key(values.mission.seed, values.mission.case)
         self._craft = spacecraft(values, key, values.substeps)
-        self._environment = flight_environment.flight_environment(values)
+        self._environment = flight_environment.flight_environment(
+            values, orbit=orbit_dispersion.case_orbit(values, key)
+        )
         self._state = initial_conditions.initial_state(initial_conditions.parameters(values), key)
         self._momentum = initial_conditions.initial_wheel_momentum(
             self._craft.body, self._state.omega_bn_b, values.initial.wheel_speed_rpm
