@@ -20,11 +20,12 @@ from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimat
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
-from css_sim import gyro, magnetometer
+from css_sim import gyro, magnetometer, tachometer
 from css_sim.disturbances import with_dipole
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
 from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
 from css_sim.spacecraft import Spacecraft, advance
+from css_sim.tachometer import Tachometer
 from sunpoint_control.held_field import HeldField
 
 
@@ -42,6 +43,7 @@ class Vehicle(NamedTuple):
     attitude: Any  # parameters of the attitude filter, or None
     control: Any  # parameters of the control law, or None
     craft: Spacecraft  # nominal
+    tachometer: Tachometer
     array_normal_b: Vec3
 
 
@@ -130,6 +132,7 @@ def fly_block(
             if read.field_valid:
                 field_b, field_step = read.field_b, step
             wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
+            tachometer.report(v.tachometer, key, step, speeds)
             known, predicted, sun_n, solar_flux, illumination = sky_at(around.sky, k)
             sky_light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
             sky = Sky(known, predicted, sun_n, solar_flux, illumination, sky_light)

@@ -37,6 +37,7 @@ from css_sim import (
     magnetometer,
     orbit_dispersion,
     sun_cells,
+    tachometer,
 )
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
@@ -231,6 +232,7 @@ class MissionFlight:
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
+            tachometer=tachometer.parameters(plant),
             array_normal_b=(x, y, z),
         )
 

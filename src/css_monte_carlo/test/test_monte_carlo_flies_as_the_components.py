@@ -72,6 +72,17 @@ VARIANTS = {
         "dynamics.dispersion.orbit.true_anomaly_deg=20.0",
         "ekf.eclipse.source=model",
     ),
+    "wheels that rub, and tachometers that do not say all": (
+        RODS,
+        "rods.fitted=true",
+        "mrp_control.dumping.enabled=true",
+        "dynamics.initial.wheel_speed_rpm=20",
+        "dynamics.friction.coulomb=0.0005",
+        "dynamics.friction.viscous=0.00002",
+        "dynamics.dispersion.friction=0.2",
+        "dynamics.tachometer.resolution_rpm=1.0",
+        "dynamics.tachometer.noise_rpm=2.0",
+    ),
     "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }

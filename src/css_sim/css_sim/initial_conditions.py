@@ -17,6 +17,7 @@ from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Values, choice, real, reals
 from css_common.sections import wheel_axes
 from css_common.vectors import Vec3, vector_of
+from css_sim import wheel_friction
 from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momentum_at_speed
 
 _DISPERSION = (
@@ -75,7 +76,7 @@ class InitialConditions(NamedTuple):
     )
 
 
-PARAMETERS = (*table_of(InitialConditions), *_DISPERSION)
+PARAMETERS = (*table_of(InitialConditions), *_DISPERSION, *wheel_friction.PARAMETERS)
 parameters = builder(InitialConditions)
 
 
@@ -173,4 +174,5 @@ def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBo
     if values.dispersion.wheel_torque > 0.0:
         draws = np.array([normal4(key, Stream.WHEEL_LIMIT, 0, i)[0] for i in range(len(torque))])
         torque = torque * np.clip(1.0 + values.dispersion.wheel_torque * draws, 0.0, None)
-    return rigid_body(inertia, axes, values.wheels.inertia, torque, values.wheels.max_speed_rpm, substeps)
+    friction = wheel_friction.dispersed_friction(wheel_friction.parameters(values), key, len(axes))
+    return rigid_body(inertia, axes, values.wheels.inertia, torque, values.wheels.max_speed_rpm, substeps, friction)

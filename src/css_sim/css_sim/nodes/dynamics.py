@@ -14,7 +14,7 @@ from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
-from css_sim import disturbances, flight_environment, initial_conditions, orbit_dispersion
+from css_sim import disturbances, flight_environment, initial_conditions, orbit_dispersion, tachometer
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
@@ -29,6 +29,7 @@ class Dynamics(Plant):
         *orbit_dispersion.PARAMETERS,
         *flight_environment.PARAMETERS,
         *disturbances.PARAMETERS,
+        *tachometer.PARAMETERS,
         integer(
             "substeps", 1, "-", "least integration steps per control cycle; fast motion has more", low=1, high=1000
         ),
@@ -61,6 +62,8 @@ class Dynamics(Plant):
         outputs = [Output("truth", "truth", SpacecraftState, frame=INERTIAL)]
         if values.wheels.fitted:
             outputs.append(Output("wheels", "wheels/state", WheelState))
+            if tachometer.errs(tachometer.parameters(values)):
+                outputs.append(Output("true_wheels", "truth/wheels", WheelState))
         if values.publish_pose:
             outputs.append(Output("pose", "truth/pose", PoseStamped, frame=INERTIAL))
         return tuple(outputs)
@@ -86,7 +89,7 @@ class Dynamics(Plant):
 
     def configure(self) -> None:
         values = self.values
-        key = random_key(values.mission.seed, values.mission.case)
+        self._key = key = random_key(values.mission.seed, values.mission.case)
         self._craft = spacecraft(values, key, values.substeps)
         self._environment = flight_environment.flight_environment(
             values, orbit=orbit_dispersion.case_orbit(values, key)
@@ -98,7 +101,9 @@ class Dynamics(Plant):
         self._wheels_at_rest = np.zeros(len(self._momentum))
         self._rods_at_rest = np.zeros(len(self._craft.rod_axes_b))
         self._torque = np.zeros(len(self._momentum))
+        self._tachometer = tachometer.parameters(values)
         self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
+        self._report = typed_call(tachometer.report)
         self._steps = round(values.mission.duration / values.mission.period)
         self.finished = False
 
@@ -143,14 +148,15 @@ class Dynamics(Plant):
         if self.values.wheels.fitted:
             speed = np.zeros(len(self._momentum))
             self._wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
-            messages["wheels"] = self.message(
-                "wheels",
-                stamp_ns,
-                speed_limited=speed_limited,
-                speed=speed,
-                torque_limited=torque_limited,
-                torque=self._torque.copy(),
-            )
+            wheels = {
+                "speed_limited": speed_limited,
+                "torque_limited": torque_limited,
+                "torque": self._torque.copy(),
+            }
+            if tachometer.errs(self._tachometer):
+                messages["true_wheels"] = self.message("true_wheels", stamp_ns, speed=speed.copy(), **wheels)
+                self._report(self._tachometer, self._key, self.step_of(stamp_ns), speed)
+            messages["wheels"] = self.message("wheels", stamp_ns, speed=speed, **wheels)
         if self.values.publish_pose:
             # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
             # dcm_bn in the convention of css_common.attitude
