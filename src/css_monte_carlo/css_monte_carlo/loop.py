@@ -23,7 +23,7 @@ from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, 
 from css_sim import gyro, magnetometer, tachometer
 from css_sim.disturbances import with_dipole
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
-from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
+from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, draw_lags, sense
 from css_sim.spacecraft import Spacecraft, advance
 from css_sim.tachometer import Tachometer
 from sunpoint_control.held_field import HeldField
@@ -70,6 +70,7 @@ class Cases(NamedTuple):
     light: np.ndarray  # (C, 192) room for the light of an own Earth
     albedo: np.ndarray  # (C, n) room for the light of the Earth on each cell
     work: np.ndarray  # (C, 224) room for its sum
+    history: np.ndarray  # (C, L) of latency.MOMENT, what late sensors still sense
 
 
 class CaseState(NamedTuple):
@@ -116,7 +117,9 @@ def fly_block(
         key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
         cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
-        sensors = SensorsOfCase(key, cells, gyro_errors, magnetometer.draw_bias(v.sensors.magnetometer, key))
+        field_bias_b = magnetometer.draw_bias(v.sensors.magnetometer, key)
+        lags = draw_lags(v.sensors, key)
+        sensors = SensorsOfCase(key, cells, gyro_errors, field_bias_b, lags, cases.history[c])
         rotation, field_b, field_step = state.rotation, state.field_b, state.field_step
         heading_state, attitude_state, control_state = state.heading, state.attitude, state.control
         for k in range(marks.shape[0]):
@@ -128,7 +131,7 @@ def fly_block(
             if v.own_earth:
                 light = cases.light[c]
                 _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
-            read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
+            read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation, environment, light, voltages)
             if read.field_valid:
                 field_b, field_step = read.field_b, step
             wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)

@@ -34,6 +34,7 @@ from css_sim import (
     earth_reflectivity,
     gyro,
     initial_conditions,
+    latency,
     magnetometer,
     orbit_dispersion,
     sun_cells,
@@ -181,6 +182,7 @@ class MissionFlight:
             light=aligned_table(len(keys) if self._own_earth else 0, len(new_light())),
             albedo=np.zeros((len(keys), len(nominal))),
             work=aligned_table(len(keys), len(new_workspace())),
+            history=np.stack([latency.new_history(max(map(latency.longest_lag, self._latencies())))] * len(keys)),
         )
         control = None
         if self._control is not None:
@@ -241,6 +243,7 @@ class MissionFlight:
         # without a gyro there is no bias to estimate
         rates = gyro.parameters(values[self._gyro.name]) if self._gyro else _NO_GYRO
         field_values = values[self._magnetometer.name] if self._magnetometer else default_values(Magnetometer.table())
+        of_cells, of_gyro, of_field = latencies = self._latencies()
         return Sensors(
             cells=sun_cells.parameters(array),
             earthlit=array.albedo.enabled,
@@ -249,7 +252,16 @@ class MissionFlight:
             magnetometer=magnetometer.parameters(field_values),
             magnetometer_on=_is_on(self._magnetometer, done),
             field_divider=field_values.magnetometer.divider if field_is_heard else 0,
+            late=any(latency.longest_lag(of_one) > 0.0 for of_one in latencies),
+            cell_latency=of_cells,
+            gyro_latency=of_gyro,
+            field_latency=of_field,
         )
+
+    def _latencies(self) -> list[latency.Latency]:
+        """Of cells, gyro and magnetometer."""
+        sensors = (self._array, self._gyro, self._magnetometer)
+        return [latency.NO_LATENCY if node is None else latency.parameters(node.values) for node in sensors]
 
     def _feels_field(self) -> bool:
         plant = self._plant.values

@@ -83,6 +83,11 @@ VARIANTS = {
         "dynamics.tachometer.resolution_rpm=1.0",
         "dynamics.tachometer.noise_rpm=2.0",
     ),
+    "late sensors": (
+        "css_array.latency=0.1",
+        "gyro.latency=0.27",
+        "gyro.latency_spread=0.2",
+    ),
     "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }
@@ -127,6 +132,7 @@ RODS_ALONE = {
         "magnetic_control.rate_from=estimator",
         "wls.rate.use_field=true",
     ),
+    "late sensors": ("magnetometer.latency=0.6", "css_array.latency=0.25", "css_array.latency_spread=0.1"),
     "no rest, a field at every cycle": ("magnetometer.divider=1", "magnetic_control.rest_before_measurement=false"),
 }
 

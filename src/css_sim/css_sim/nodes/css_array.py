@@ -19,7 +19,8 @@ from css_environment.earth_light import new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
 from css_msgs.msg import CssVoltages, SpacecraftState
-from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, sun_cells
+from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, latency, sun_cells
+from css_sim.delayed import Delayed
 from css_sim.sensing import CellsOfCase, sense_cells
 from css_sim.sensor_checks import LOUDEST_CELL, noise_findings
 
@@ -34,6 +35,7 @@ class CssArray(Component):
         *cell_errors.PARAMETERS,
         *cell_screen.PARAMETERS,
         *earth_reflectivity.PARAMETERS,
+        *latency.PARAMETERS,
     )
 
     @classmethod
@@ -54,6 +56,7 @@ class CssArray(Component):
         yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
         yield from earth_reflectivity.conflicts(values)
+        yield from latency.conflicts(values)
         if values.output_low >= values.output_high:
             yield f"output_low: {values.output_low:g} given, expected less than output_high"
         # estimators would take for missing what these cells put out
@@ -79,6 +82,7 @@ class CssArray(Component):
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
         self._albedo_model = MODELS[values.albedo.model]
         self._view, self._light = new_earth_view(), new_light()
+        self._delayed = Delayed(latency.parameters(values), self._key, latency.CELLS)
         self._segment_s = -1.0
         self._to_dcm, self._turn = typed_call(mrp_to_dcm), typed_call(multiply)
         self._advance_earth = typed_call(advance_dcm_en)
@@ -91,8 +95,11 @@ class CssArray(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
-        dcm_bn = self._to_dcm(vector_of(truth.sigma_bn))
-        sun_n = vector_of(truth.sun_n)
+        sigma_bn, sun_n = vector_of(truth.sigma_bn), vector_of(truth.sun_n)
+        intensity = truth.solar_flux * truth.illumination
+        step = self.step_of(stamp_ns)
+        of_sun = self._delayed(step, sigma_bn=sigma_bn, sun_n=sun_n, intensity=intensity)
+        dcm_bn = self._to_dcm(of_sun.sigma_bn)
         if self.values.albedo.enabled:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
             self._sources(
@@ -110,10 +117,10 @@ class CssArray(Component):
             self._p,
             self._cells,
             self._key,
-            self.step_of(stamp_ns),
+            step,
             dcm_bn,
-            self._turn(dcm_bn, sun_n),
-            truth.solar_flux * truth.illumination,
+            self._turn(dcm_bn, of_sun.sun_n),
+            of_sun.intensity,
             self.values.albedo.enabled,
             self._light,
             voltages,
