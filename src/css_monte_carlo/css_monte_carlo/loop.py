@@ -15,6 +15,7 @@ from css_common.kernel import kernel, study_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply, row
 from css_environment.albedo_vector import PATCHES, point_source
+from css_environment.moving_clouds import CloudMotion, Clouds, is_cloud_step, reflect
 from css_estimation.sun.sun_heading import Aiding, Sky
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
 from css_monte_carlo.state_table import keep_state, state_of
@@ -36,6 +37,7 @@ class Vehicle(NamedTuple):
     sensors: Sensors
     own_earth: bool  # each case has its own reflectivities
     albedo_model: int  # of `albedo_vector`
+    clouds: Clouds
     heading_hears_field: bool
     control_hears_field: bool
     heading_hears_wheels: bool
@@ -66,7 +68,9 @@ class Cases(NamedTuple):
     rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
     faults: np.ndarray  # (C, F) of cell_faults.FAULT
-    reflectivity: np.ndarray  # (C, rows, columns); (0, 0, 0) when the Earth is common
+    reflectivity: np.ndarray  # (C, rows, columns), written where clouds move; (0, 0, 0) when the Earth is common
+    cloud_fields: np.ndarray  # (C, F, rows, columns) of clouds that move; else (0, 0, 0, 0)
+    cloud_motion: np.ndarray  # (C, 3) of `moving_clouds.CloudMotion`
     light: np.ndarray  # (C, 192) room for the light of an own Earth
     albedo: np.ndarray  # (C, n) room for the light of the Earth on each cell
     work: np.ndarray  # (C, 224) room for its sum
@@ -130,6 +134,10 @@ def fly_block(
             light = around.light[min(k, around.light.shape[0] - 1)]
             if v.own_earth:
                 light = cases.light[c]
+                elapsed_ns = step * v.period_ns
+                if v.clouds.moving and (k == 0 or is_cloud_step(elapsed_ns, v.period_ns)):
+                    motion = CloudMotion(*row(cases.cloud_motion, c))
+                    reflect(v.clouds, motion, cases.cloud_fields[c], elapsed_ns, cases.reflectivity[c])
                 _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
             read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation, environment, light, voltages)
             if read.field_valid:

@@ -151,9 +151,13 @@ class MissionFlight:
         model = cell_errors.error_model(array)
         for row, key in zip(cells, keys, strict=True):
             cell_errors.draw_cells(model, key, nominal, row)
-        earths = np.zeros((0, 0, 0))
+        earths, motions, fields = np.zeros((0, 0, 0)), np.zeros((0, 3)), np.zeros((0, 0, 0, 0))
         if self._own_earth:
             assert self._grid is not None
+            if earth_reflectivity.clouds_move(array):
+                clouds = [earth_reflectivity.case_clouds(array, self._grid, key) for key in keys]
+                motions = np.array([motion for motion, _ in clouds])
+                fields = np.stack([of_case for _, of_case in clouds])
             earths = np.stack([earth_reflectivity.case_reflectivity(array, self._grid, key) for key in keys])
         momentum = np.stack(
             [
@@ -179,6 +183,8 @@ class MissionFlight:
             cells=cells,
             faults=self._faults(array, numbers),
             reflectivity=earths,
+            cloud_fields=fields,
+            cloud_motion=motions,
             light=aligned_table(len(keys) if self._own_earth else 0, len(new_light())),
             albedo=np.zeros((len(keys), len(nominal))),
             work=aligned_table(len(keys), len(new_workspace())),
@@ -227,6 +233,7 @@ class MissionFlight:
             sensors=self._sensors(values, done, is_heard),
             own_earth=self._own_earth,
             albedo_model=MODELS[array.albedo.model],
+            clouds=earth_reflectivity.clouds(self._array.values, self._grid),
             heading_hears_field=heading_hears,
             control_hears_field=control_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),

@@ -88,6 +88,12 @@ VARIANTS = {
         "gyro.latency=0.27",
         "gyro.latency_spread=0.2",
     ),
+    "clouds that move": (
+        "css_array.albedo.draw=per_cell",
+        "css_array.albedo.drift_m_s=100.0",
+        "css_array.albedo.drift_spread_m_s=20.0",
+        "css_array.albedo.renewal_h=0.02",
+    ),
     "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }

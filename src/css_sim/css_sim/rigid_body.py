@@ -46,7 +46,8 @@ WHEEL = np.dtype(
     align=True,
 )
 """One reaction wheel: unit spin axis in b, spin inertia [kg m2], limits of torque [N m] and speed [rad/s], Coulomb
-[N m] and viscous [N m s] friction, and how its speed relative to the body responds to a torque on it [rad/s2 / (N m)]."""
+[N m] and viscous [N m s] friction, and how its speed relative to the body responds to a torque on it [rad/s2/(N m)].
+"""
 
 
 class RigidBody(NamedTuple):

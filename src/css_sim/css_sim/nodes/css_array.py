@@ -18,6 +18,7 @@ from css_environment.albedo_vector import MODELS, earth_light_sources
 from css_environment.earth_light import new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
+from css_environment.moving_clouds import CLOUD_STEP_NS, reflect
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, latency, sun_cells
 from css_sim.delayed import Delayed
@@ -80,6 +81,11 @@ class CssArray(Component):
         self._cells = CellsOfCase(cells, faults, np.zeros(len(cells)), new_workspace())
         grid = earth_reflectivity.source(values, self.epoch_ns)
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
+        self._clouds = earth_reflectivity.clouds(values, grid if values.albedo.enabled else None)
+        self._cloud_step = -1
+        if self._clouds.moving:
+            self._cloud_motion, self._cloud_fields = earth_reflectivity.case_clouds(values, grid, self._key)
+        self._reflect = typed_call(reflect)
         self._albedo_model = MODELS[values.albedo.model]
         self._view, self._light = new_earth_view(), new_light()
         self._delayed = Delayed(latency.parameters(values), self._key, latency.CELLS)
@@ -102,6 +108,8 @@ class CssArray(Component):
         dcm_bn = self._to_dcm(of_sun.sigma_bn)
         if self.values.albedo.enabled:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
+            if self._clouds.moving:
+                self._move_clouds(stamp_ns - self.epoch_ns)
             self._sources(
                 self._albedo_model,
                 self._view,
@@ -126,6 +134,11 @@ class CssArray(Component):
             voltages,
         )
         return {"voltages": self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)}
+
+    def _move_clouds(self, elapsed_ns: int) -> None:
+        if elapsed_ns // CLOUD_STEP_NS != self._cloud_step:
+            self._cloud_step = elapsed_ns // CLOUD_STEP_NS
+            self._reflect(self._clouds, self._cloud_motion, self._cloud_fields, elapsed_ns, self._reflectivity)
 
     def _earth_attitude(self, elapsed_s: float) -> Mat3:
         """Rotation from n to the Earth-fixed frame, in the same segments and so the same digits as the ephemeris."""
