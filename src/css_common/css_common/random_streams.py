@@ -43,6 +43,7 @@ class Stream(IntEnum):
     SLIT_FAULT = 22
     SPIN_PHASE = 23
     CLOUDS = 24
+    EPOCH = 25
 
 
 class RandomKey(NamedTuple):

@@ -26,6 +26,14 @@ MISSION: Table = (
     text("mission.name", "unnamed", "name of the mission, as in the file name"),
     text("mission.description", "", "one line for reports"),
     text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step"),
+    real(
+        "mission.epoch_spread_days",
+        0.0,
+        "d",
+        "cases begin at instants within so many days after the epoch, each at one of its own",
+        low=0.0,
+        high=20_000.0,
+    ),
     real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7),
     real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0),
     integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1),
@@ -367,7 +375,8 @@ def _mission_conflicts(mission: Values) -> Iterator[str]:
     except ValueError as error:
         yield f"mission.epoch: {error}"
         return
-    if begin < 0 or begin + mission.duration * 1e9 >= _LAST_STAMP_NS:
+    spread_s = mission.epoch_spread_days * 86_400.0
+    if begin < 0 or begin + (spread_s + mission.duration) * 1e9 >= _LAST_STAMP_NS:
         yield (
             f"mission.epoch: {mission.epoch} given, expected a flight of {mission.duration:g} s between "
             "1970-01-01 and 2038-01-19: the seconds of a ROS stamp have 32 bits"

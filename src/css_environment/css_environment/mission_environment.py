@@ -7,7 +7,7 @@ The simulated truth builds one with the truth's parameters, flight software one 
 import math
 from functools import lru_cache
 
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_environment import ephemeris
@@ -43,7 +43,7 @@ def mission_orbit(values: Values) -> Orbit:
     """
     o = values.orbit
     if o.source == "ballistic":
-        return _arc(mission_launch(values), parse_utc(values.mission.epoch))
+        return _arc(mission_launch(values), mission_epoch(values.mission))
     if o.source == "tle":
         return TleOrbit(o.tle_line1, o.tle_line2)
     elements = keplerian_orbit(
@@ -80,7 +80,7 @@ class MissionEnvironment:
             orbit: None: that of the section.
         """
         self._orbit = mission_orbit(values) if orbit is None else orbit
-        self._epoch_ns = parse_utc(values.mission.epoch)
+        self._epoch_ns = mission_epoch(values.mission)
         self._field = field
         self._conical_shadow = conical_shadow
         self._field_degree = field_degree

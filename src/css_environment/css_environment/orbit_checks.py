@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from css_common.component import Finding
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.schema import Values
 from css_environment.ballistic import geodetic_heights
 from css_environment.constants import EARTH_RADIUS
@@ -31,7 +31,7 @@ _SECOND_NS = 10**9
 
 def orbit_findings(values: Values) -> Iterator[Finding]:
     """What is wrong with a mission's orbit over its flight (sections mission and orbit)."""
-    epoch_ns, duration_s = parse_utc(values.mission.epoch), values.mission.duration
+    epoch_ns, duration_s = mission_epoch(values.mission), values.mission.duration
     try:
         orbit = mission_orbit(values)
     except ValueError as error:
@@ -63,7 +63,7 @@ def _arc_findings(orbit: KeplerianOrbit, epoch_ns: int, duration_s: float) -> It
 
 def field_findings(values: Values) -> Iterator[Finding]:
     """What is wrong with the geomagnetic field over the flight, where it is used (sections mission and orbit)."""
-    end_ns = parse_utc(values.mission.epoch) + round(values.mission.duration * 1e9)
+    end_ns = mission_epoch(values.mission) + round(values.mission.duration * 1e9)
     end = datetime.fromtimestamp(end_ns / _SECOND_NS, tz=UTC)
     beyond = (end - datetime(LAST_YEAR, 1, 1, tzinfo=UTC)).total_seconds() / (365.25 * 86_400.0)
     if beyond > 0.0:

@@ -74,10 +74,10 @@ def fly_cases(
     flight: MissionFlight, numbers: np.ndarray, sample_every: int, guess_deg: float = 0.0, traced: bool = False
 ) -> Flown:
     """Flies cases (C,) of a mission, each independent of the others; `guess_deg` as of `MissionFlight.cases`."""
-    if not flight.own_orbit:
+    if not flight.own_surroundings:
         return _fly_together(flight, numbers, sample_every, guess_deg, traced)
     parts = [
-        _fly_together(flight.on_orbit_of(int(number)), np.array([number]), sample_every, guess_deg, traced)
+        _fly_together(flight.around_case(int(number)), np.array([number]), sample_every, guess_deg, traced)
         for number in numbers
     ]
     trace = np.concatenate([part.trace for part in parts])

@@ -3,7 +3,6 @@
 
 import math
 from collections.abc import Iterator
-from copy import copy
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -65,7 +64,7 @@ class MissionFlight:
         mission: what flies.
         steps: control cycles of a flight.
         measure: how the estimator of interest is measured.
-        own_orbit: cases differ in their orbits, and share neither `surroundings` nor `marks`.
+        own_surroundings: cases differ in orbit or epoch, and share neither `surroundings` nor `marks`.
         surroundings: the environment that all cases share, or that of one case.
         marks: (steps,) what is special about each step, see `case_tallies.step_marks`.
     """
@@ -92,31 +91,25 @@ class MissionFlight:
         common = None
         if self._grid is not None:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
-        self._common_earth = common
-        self.own_orbit = orbit_dispersion.is_dispersed(self._plant.values)
-        self._surround(mission.values.mission.case)
-
-    def _surround(self, case: int) -> None:
-        """Takes the orbit of a case, which is that of all unless they are dispersed."""
-        plant = self._plant.values
+        values = mission.values.mission
+        self.own_surroundings = orbit_dispersion.is_dispersed(self._plant.values) or values.epoch_spread_days > 0.0
+        self._measured = estimator
         self.surroundings = SurroundingsTables(
-            plant,
+            self._plant.values,
             _values(self._heading),
             _values(self._filter),
-            self._common_earth,
+            common,
             self._own_earth,
             self._feels_field(),
-            MODELS[self._array.values.albedo.model],
-            orbit_dispersion.case_orbit(plant, self._key(case)),
+            MODELS[array.albedo.model],
+            orbit_dispersion.case_orbit(self._plant.values, self._key(values.case)),
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
-        self.marks = step_marks(illumination, self.mission.period_ns * 1e-9, windows_of(self.mission))
+        self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
 
-    def on_orbit_of(self, case: int) -> "MissionFlight":
-        """The same flights on the orbit of a case, where cases differ in theirs (`own_orbit`)."""
-        flight = copy(self)
-        flight._surround(case)
-        return flight
+    def around_case(self, case: int) -> "MissionFlight":
+        """The same flights in the surroundings of a case, where cases differ in theirs (`own_surroundings`)."""
+        return MissionFlight(self.mission.with_overrides([f"mission.case={case}"]), self._measured)
 
     @property
     def trace_columns(self) -> int:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3
@@ -178,7 +178,7 @@ class SurroundingsTables:
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
-        self._epoch_ns = parse_utc(plant.mission.epoch)
+        self._epoch_ns = mission_epoch(plant.mission)
         self._reflectivity = reflectivity
         self._own_earth = own_earth
         self._albedo_model = albedo_model

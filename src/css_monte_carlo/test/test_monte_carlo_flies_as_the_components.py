@@ -66,6 +66,7 @@ VARIANTS = {
     "a dispersed orbit, integrated for the truth alone": (
         "css_array.albedo.draw=per_cell",
         "dynamics.orbit.model=j2_integrated",
+        "mission.epoch_spread_days=365.0",
         "dynamics.dispersion.orbit.altitude=500.0",
         "dynamics.dispersion.orbit.inclination_deg=0.1",
         "dynamics.dispersion.orbit.raan_deg=10.0",
