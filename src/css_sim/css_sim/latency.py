@@ -18,6 +18,7 @@ from css_common.declared import builder, computed, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values, real
+from css_common.sections import PERIOD
 from css_common.vectors import Vec3, add, dot, norm, scale, subtract
 
 CELLS, GYRO, MAGNETOMETER = 0, 1, 2
@@ -32,12 +33,12 @@ _ROUNDING = 1e-9  # [cycles] from a whole number that a latency is taken for one
 
 
 def _lag(values: Values) -> float:
-    cycles = values[_LATENCY] / values.mission.period
+    cycles = values[_LATENCY] / values[PERIOD]
     return float(round(cycles)) if abs(cycles - round(cycles)) < _ROUNDING else cycles
 
 
 def _spread(values: Values) -> float:
-    return values[_SPREAD] / values.mission.period
+    return values[_SPREAD] / values[PERIOD]
 
 
 class Latency(NamedTuple):

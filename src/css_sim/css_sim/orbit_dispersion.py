@@ -6,33 +6,54 @@ Flight software goes by the section; what is drawn here is the error of its plac
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
+from css_common.declared import builder, given, made, table_of
 from css_common.random_streams import RandomKey, Stream, normal4
-from css_common.schema import Table, Values, real
+from css_common.schema import Values, real
+from css_common.sections import ORBIT_SOURCE
 from css_environment.constants import EARTH_RADIUS
 from css_environment.mission_environment import mission_orbit
 from css_environment.orbit import IntegratedOrbit, KeplerianOrbit, Orbit
 
-PARAMETERS: Table = (
-    real("dispersion.orbit.altitude", 0.0, "m", "1 sigma of the true semi-major axis", low=0.0, high=1e6),
-    real("dispersion.orbit.inclination_deg", 0.0, "deg", "1 sigma of the true inclination", low=0.0, high=10.0),
-    real("dispersion.orbit.raan_deg", 0.0, "deg", "1 sigma of the true node", low=0.0, high=180.0),
-    real("dispersion.orbit.true_anomaly_deg", 0.0, "deg", "1 sigma of the true place in orbit", low=0.0, high=180.0),
-)
+
+class OrbitDispersion(NamedTuple):
+    """1 sigma of the true elements about those of the mission."""
+
+    altitude: float = given(  # [m]
+        real("dispersion.orbit.altitude", 0.0, "m", "1 sigma of the true semi-major axis", low=0.0, high=1e6)
+    )
+    inclination: float = made(  # [rad]
+        math.radians,
+        real("dispersion.orbit.inclination_deg", 0.0, "deg", "1 sigma of the true inclination", low=0.0, high=10.0),
+    )
+    raan: float = made(  # [rad]
+        math.radians, real("dispersion.orbit.raan_deg", 0.0, "deg", "1 sigma of the true node", low=0.0, high=180.0)
+    )
+    true_anomaly: float = made(  # [rad]
+        math.radians,
+        real(
+            "dispersion.orbit.true_anomaly_deg", 0.0, "deg", "1 sigma of the true place in orbit", low=0.0, high=180.0
+        ),
+    )
+
+
+PARAMETERS = table_of(OrbitDispersion)
+parameters = builder(OrbitDispersion)
 
 _LOWEST_PERIGEE = EARTH_RADIUS + 100e3  # [m] as for a mission's own elements
 
 
 def is_dispersed(values: Values) -> bool:
     """Whether cases differ in their orbits."""
-    return any(values[parameter] > 0.0 for parameter in PARAMETERS)
+    return any(sigma > 0.0 for sigma in parameters(values))
 
 
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
-    if is_dispersed(values) and values.orbit.source != "elements":
-        name = next(parameter.name for parameter in PARAMETERS if values[parameter] > 0.0)
-        yield f"{name}: {values.orbit.source} given as orbit.source, expected elements, which can be dispersed"
+    if is_dispersed(values) and values[ORBIT_SOURCE] != "elements":
+        name = next(p.name for p, sigma in zip(PARAMETERS, parameters(values), strict=True) if sigma > 0.0)
+        yield f"{name}: {values[ORBIT_SOURCE]} given as orbit.source, expected elements, which can be dispersed"
 
 
 def case_orbit(values: Values, key: RandomKey) -> Orbit:
@@ -41,19 +62,19 @@ def case_orbit(values: Values, key: RandomKey) -> Orbit:
     if not is_dispersed(values):
         return orbit
     if isinstance(orbit, IntegratedOrbit):
-        return IntegratedOrbit(_dispersed(orbit.elements, values, key))
+        return IntegratedOrbit(_dispersed(orbit.elements, parameters(values), key))
     assert isinstance(orbit, KeplerianOrbit)  # `conflicts` refuses others
-    return _dispersed(orbit, values, key)
+    return _dispersed(orbit, parameters(values), key)
 
 
-def _dispersed(orbit: KeplerianOrbit, values: Values, key: RandomKey) -> KeplerianOrbit:
-    sigma, draws = values.dispersion.orbit, normal4(key, Stream.ORBIT, 0, 0)
-    inclination = orbit.inclination + math.radians(sigma.inclination_deg) * draws[1]
+def _dispersed(orbit: KeplerianOrbit, sigma: OrbitDispersion, key: RandomKey) -> KeplerianOrbit:
+    draws = normal4(key, Stream.ORBIT, 0, 0)
+    inclination = orbit.inclination + sigma.inclination * draws[1]
     return orbit._replace(
         semi_major_axis=max(
             orbit.semi_major_axis + sigma.altitude * draws[0], _LOWEST_PERIGEE / (1.0 - orbit.eccentricity)
         ),
         inclination=min(max(inclination, 0.0), math.pi),
-        raan=orbit.raan + math.radians(sigma.raan_deg) * draws[2],
-        true_anomaly=orbit.true_anomaly + math.radians(sigma.true_anomaly_deg) * draws[3],
+        raan=orbit.raan + sigma.raan * draws[2],
+        true_anomaly=orbit.true_anomaly + sigma.true_anomaly * draws[3],
     )
