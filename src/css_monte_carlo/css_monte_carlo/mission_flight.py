@@ -255,8 +255,20 @@ class MissionFlight:
             late=any(latency.longest_lag(of_one) > 0.0 for of_one in latencies),
             cell_latency=of_cells,
             gyro_latency=of_gyro,
+            gyro_since=self._on_since(self._gyro, done),
             field_latency=of_field,
+            field_since=self._on_since(self._magnetometer, done),
         )
+
+    def _on_since(self, sensor: Node | None, done: list[Event]) -> int:
+        """Step at which a sensor was last switched on; 0: it was on from the first step."""
+        switches = [] if sensor is None else [e for e in done if e.node == sensor.name and e.action != "set"]
+        on, since = True, 0
+        for event in switches:
+            if event.action == "activate" and not on:
+                since = first_step(event, self.mission.period_ns)
+            on = event.action == "activate"
+        return since
 
     def _latencies(self) -> list[latency.Latency]:
         """Of cells, gyro and magnetometer."""

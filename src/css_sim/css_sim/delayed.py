@@ -33,4 +33,4 @@ class Delayed:
         if self._lag <= 0.0:
             return now
         self._remember(self._history, step, now)
-        return self._sensed(self._history, step, self._lag, now)
+        return self._sensed(self._history, step, self._lag, now, 0)

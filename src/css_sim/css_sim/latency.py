@@ -5,7 +5,7 @@ What bears the stamp of cycle k is what there was at t_k less the latency: attit
 Sun and the field. Between two cycles they are interpolated linearly, attitudes as MRPs of one set, which is good to
 1e-6 rad at 2 deg/s and ten cycles a second. Before the epoch there was what there is at the epoch. The light of the
 Earth is that of the stamp, which moves by 0.07 deg a second. Noise and walking biases are those of the stamp's cycle.
-A sensor that missed cycles, as one that was restarted, takes the oldest it has heard of since.
+A sensor that was restarted or switched on takes the oldest that there was since.
 """
 
 import math
@@ -108,19 +108,20 @@ def remember(history, step: int, now: Moment) -> None:
 
 
 @kernel
-def sensed(history, step: int, lag: float, now: Moment) -> Moment:
+def sensed(history, step: int, lag: float, now: Moment, since: int) -> Moment:
     """What a sensor senses at a control cycle, `lag` cycles late; 0: what there is now.
 
     Args:
         history: (L,) of MOMENT, with `now` in it.
+        since: control cycle at which the sensor was switched on.
     """
     if lag <= 0.0:
         return now
     whole = math.floor(lag)
-    late = _moment(history, step, step - int(whole))
+    late = _moment(history, step, step - whole, since)
     if lag == whole:
         return late
-    early = _moment(history, step, step - int(whole) - 1)
+    early = _moment(history, step, step - whole - 1, since)
     part = lag - whole
     return Moment(
         _between(_same_set(late.sigma_bn, early.sigma_bn), early.sigma_bn, part),
@@ -147,10 +148,10 @@ def _between(late: Vec3, early: Vec3, part: float) -> Vec3:
 
 
 @kernel
-def _moment(history, step: int, wanted: int) -> Moment:
+def _moment(history, step: int, wanted: int, since: int) -> Moment:
     """What there was at a cycle, or at the first one after it that is known."""
     size = history.shape[0]
-    known = max(wanted, step - size + 1, 0)
+    known = max(wanted, step - size + 1, since)
     while known < step and history[known % size].step != known:
         known += 1
     m = history[known % size]

@@ -37,7 +37,9 @@ class Sensors(NamedTuple):
     late: bool  # some sensor reads what was before its stamp
     cell_latency: Latency
     gyro_latency: Latency
+    gyro_since: int  # cycle at which the gyro was switched on
     field_latency: Latency
+    field_since: int
 
 
 class CellsOfCase(NamedTuple):
@@ -132,12 +134,12 @@ def sense(
         now = Moment(rotation.sigma_bn, omega_bn_b, environment.sun_n, intensity, field_n)
         remember(case.history, step, now)
         if case.lags[0] > 0.0:
-            of_cells = sensed(case.history, step, case.lags[0], now)
+            of_cells = sensed(case.history, step, case.lags[0], now, 0)
             dcm_bn, intensity = mrp_to_dcm(of_cells.sigma_bn), of_cells.intensity
             sun_b = multiply(dcm_bn, of_cells.sun_n)
-        omega_bn_b = sensed(case.history, step, case.lags[1], now).omega_bn_b
+        omega_bn_b = sensed(case.history, step, case.lags[1], now, p.gyro_since).omega_bn_b
         if case.lags[2] > 0.0:
-            of_field = sensed(case.history, step, case.lags[2], now)
+            of_field = sensed(case.history, step, case.lags[2], now, p.field_since)
             field_dcm_bn, field_n = mrp_to_dcm(of_field.sigma_bn), of_field.field_n
     sense_cells(p.cells, case.cells, case.key, step, dcm_bn, sun_b, intensity, p.earthlit, light, voltages_out)
     bias_b = gyro.bias_at(p.gyro, case.gyro, case.key, step)

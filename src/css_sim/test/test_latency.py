@@ -28,11 +28,11 @@ def moment(t):
     return Moment(attitude(t), (t, 2.0 * t, -t), (1.0, 0.0, t), 1.0 - 0.1 * t, (0.0, t, 0.0))
 
 
-def sensed(lag, step, known, begin_s=-0.5):
+def sensed(lag, step, known, begin_s=-0.5, since=0):
     history = new_history(10.0)
     for k in known:
         remember(history, k, moment(begin_s + 0.1 * k))
-    return sensed_at(history, step, lag, moment(begin_s + 0.1 * step))
+    return sensed_at(history, step, lag, moment(begin_s + 0.1 * step), since)
 
 
 @pytest.mark.parametrize("lag", [0.0, 1.0, 3.0, 10.0])
@@ -62,6 +62,12 @@ def test_a_restarted_sensor_takes_the_oldest_it_knows():
     assert sensed(5.0, 20, [18, 19, 20]) == moment(-0.5 + 0.1 * 18)
     assert sensed(5.0, 20, [20]) == moment(-0.5 + 0.1 * 20)
     assert sensed(5.0, 20, [*range(14), 17, 18, 19, 20]) == moment(-0.5 + 0.1 * 17)  # cycles 14 to 16 were missed
+
+
+def test_a_sensor_that_is_switched_on_knows_nothing_from_before():
+    assert sensed(5.0, 20, range(21), since=18) == moment(-0.5 + 0.1 * 18)
+    assert sensed(5.5, 20, range(21), since=18) == moment(-0.5 + 0.1 * 18)
+    assert sensed(5.0, 30, range(31), since=18) == moment(-0.5 + 0.1 * 25)
 
 
 def test_a_node_remembers_what_it_hears():

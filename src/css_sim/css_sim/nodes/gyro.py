@@ -61,8 +61,6 @@ class Gyro(Component):
         return self._imu(stamp_ns, np.array(rate), self._covariance)
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
-        if received["truth"] is not None:  # remembered for when it is on again
-            self._delayed(self.step_of(stamp_ns), omega_bn_b=vector_of(received["truth"].omega_bn_b))
         return self._imu(stamp_ns, _ZERO, _NOTHING)
 
     def _imu(self, stamp_ns: int, rate: np.ndarray, covariance: np.ndarray) -> Outgoing:

@@ -69,8 +69,6 @@ class Magnetometer(Component):
         return self._delayed(step, sigma_bn=vector_of(truth.sigma_bn), field_n=vector_of(truth.field_n))
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
-        if received["truth"] is not None:  # remembered for when it is on again
-            self._there(self.step_of(stamp_ns), received["truth"])
         return self._field(stamp_ns, np.zeros(3), _NOTHING) if self._is_due(self.step_of(stamp_ns)) else {}
 
     def _is_due(self, step: int) -> bool:
