@@ -93,6 +93,9 @@ def conflicts(values: Values) -> Iterator[str]:
     if len(speeds) not in ((0, 1, wheels) if wheels else (0,)):
         expected = f"none, 1 or {wheels}" if wheels else "none without wheels"
         yield f"initial.wheel_speed_rpm: {len(speeds)} values given, expected {expected}"
+    coulomb = wheel_friction.parameters(values).coulomb
+    if wheels and coulomb > 0.0 and coulomb >= values[WHEEL_MAX_TORQUE]:
+        yield f"friction.coulomb: {coulomb:g} given, expected less than wheels.max_torque, which would not turn a wheel"
     fastest = np.max(np.abs(speeds), initial=0.0)
     if fastest > values[WHEEL_MAX_SPEED]:
         yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"

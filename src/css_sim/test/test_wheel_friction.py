@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from css_common.attitude import mrp_to_dcm
+from css_common.mission import MissionError, load_mission
 from css_common.random_streams import random_key
 from css_sim.rigid_body import RotationState, propagate, rigid_body, wheel_momentum_at_speed, wheel_speed
 from css_sim.wheel_friction import Friction, dispersed_friction, shaft_torque
@@ -137,3 +138,9 @@ def test_wheels_differ_from_case_to_case():
     assert abs(factor.mean() - 1.0) < 0.01 and abs(factor.std() - 0.1) < 0.006
     assert abs(np.corrcoef(factor.T)[0, 1]) < 0.1
     np.testing.assert_array_equal(dispersed_friction(Friction(COULOMB, VISCOUS, 0.0), random_key(1, 5), 3)[0], COULOMB)
+
+
+def test_friction_that_no_motor_overcomes_is_refused():
+    load_mission("okeefe_2013", ["dynamics.friction.coulomb=0.029"])
+    with pytest.raises(MissionError, match=r"friction.coulomb: 0\.03 given, expected less than wheels.max_torque"):
+        load_mission("okeefe_2013", ["dynamics.friction.coulomb=0.03"])
