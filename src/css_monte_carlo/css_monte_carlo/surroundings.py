@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
 from css_environment import ephemeris
@@ -18,6 +18,7 @@ from css_environment.albedo_vector import PATCHES, earth_light_sources
 from css_environment.earth_light import EarthView, gather_light, look_at_earth, new_earth_view, new_light
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.mission_environment import MissionEnvironment
+from css_environment.orbit import Orbit
 from css_estimation.attitude.flight_references import FlightReferences, References
 from css_estimation.sun import flight_sky
 from css_estimation.sun.flight_sky import FlightSky
@@ -169,6 +170,7 @@ class SurroundingsTables:
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
         albedo_model: `albedo_vector.PATCHES`, `VECTOR` or `NADIR`.
+        orbit: the true one, where cases differ in theirs; None: that of the plant.
     """
 
     def __init__(
@@ -180,13 +182,14 @@ class SurroundingsTables:
         own_earth: bool = False,
         field: bool = True,
         albedo_model: int = PATCHES,
+        orbit: Orbit | None = None,
     ) -> None:
-        self._environment: MissionEnvironment = flight_environment(plant, field)
+        self._environment: MissionEnvironment = flight_environment(plant, field, orbit)
         self._sky: FlightSky | None = None if heading is None else flight_sky.flight_sky(heading)
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
-        self._epoch_ns = parse_utc(plant.mission.epoch)
+        self._epoch_ns = mission_epoch(plant.mission)
         self._reflectivity = reflectivity
         self._own_earth = own_earth
         self._albedo_model = albedo_model

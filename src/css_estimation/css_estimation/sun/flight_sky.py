@@ -7,7 +7,7 @@ The Earth is the filter's own: a mean reflectivity without the clouds of the day
 from typing import NamedTuple
 
 from css_common.declared import given, part, table_of
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.schema import Values, flag
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.mean_earth import MeanEarth, PredictedLight
@@ -48,7 +48,7 @@ class FlightSky:
             with_field: predict its magnetic field.
         """
         self._environment = MissionEnvironment(values, field=with_field)
-        self._epoch_ns = parse_utc(values.mission.epoch)
+        self._epoch_ns = mission_epoch(values.mission)
         self.has_light = with_light
         self._predicted = PredictedLight(values) if with_light else None
         self._light = UNKNOWN_SKY.light if self._predicted is None else self._predicted.light
