@@ -194,6 +194,7 @@ def read_cells(
             sunlight = flux * max(cosine, p.cos_half_view)
             seen = sunlight > p.earth.largest and v > gain * scale_now * (albedo + 0.5 * sunlight)
             if not seen:
+                likelihood -= 0.5 * (1.0 + math.log(p.errors.noise))
                 continue
         cloud = p.earth.clouds * mean_light
         cloud_state, own = GAIN + cells + i, first_state(cells) + PER_CELL * i
@@ -211,6 +212,9 @@ def read_cells(
         factor = gain * (1.0 + x[X_GAIN + i])
         expected = factor * scale_now * output
         if not seen and expected < dark and v < _SURELY_LIT * dark:
+            # no correction, but as good an explanation as that of a filter which has the cell lit
+            squared = (v - expected) * (v - expected) / p.errors.noise
+            likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(p.errors.noise))
             continue
         if not earth_known and not seen and v < p.earth.largest * flux:
             continue
@@ -266,23 +270,35 @@ def read_cells(
         nis += squared
         dof += 1
         used |= 1 << i
-        for j in range(corrected):
-            share = gained[j] / variance
-            correction[j] += share * innovation
-            for k in range(states):
-                covariance[j, k] -= share * gained[k]
-        for j in range(corrected, states):
-            share = gained[j] / variance
-            for k in range(corrected):
-                covariance[j, k] -= share * gained[k]
-    _correct(x, correction, cells, earth_known)
-    correct_calibration(p.calibration, cells, x, correction)
+        absorb(gained, innovation, variance, corrected, states, correction, covariance)
+    correct(p, x, correction, states)
     return CellReading(nis, dof, used, refused, contrary, likelihood, sigma)
 
 
 @kernel
-def _correct(x, correction, cells: int, earth_known: bool) -> None:
-    """Adds the corrections to an estimate."""
+def absorb(gained, innovation: float, variance: float, corrected: int, states: int, correction, covariance) -> None:
+    """Takes one reading into correction and covariance.
+
+    Args:
+        gained: covariance of the states with the reading.
+        variance: of the innovation.
+        corrected: so many of the states in use are corrected; the others have no gain, they are considered (Schmidt).
+    """
+    for j in range(corrected):
+        share = gained[j] / variance
+        correction[j] += share * innovation
+        for k in range(states):
+            covariance[j, k] -= share * gained[k]
+    for j in range(corrected, states):
+        share = gained[j] / variance
+        for k in range(corrected):
+            covariance[j, k] -= share * gained[k]
+
+
+@kernel
+def correct(p: SunFilterParameters, x, correction, states: int) -> None:
+    """Adds the corrections of the states in use to an estimate."""
+    cells = p.cells.shape[0]
     theta = (correction[0], correction[1], correction[2])
     length = norm(theta)
     if length > _LONGEST:
@@ -293,7 +309,8 @@ def _correct(x, correction, cells: int, earth_known: bool) -> None:
     x[X_SCALE] += correction[SCALE]
     for i in range(cells):
         x[X_GAIN + i] += correction[GAIN + i]
-    if earth_known:
+    if states > GAIN + cells:
         x[X_EARTH] = max(_LEAST_EARTH, x[X_EARTH] + correction[EARTH])
         for i in range(cells):
             x[X_GAIN + cells + i] += correction[GAIN + cells + i]
+        correct_calibration(p.calibration, cells, x, correction)
