@@ -102,7 +102,7 @@ CELLS: Table = (
         length=3,
     ),
     real("cells.smallest_reading", -10.0, "-", "an output below it is no reading: the cell is missing", high=0.0),
-    real("cells.largest_reading", 10.0, "-", "an output above it is no reading: the cell is missing", low=0.0),
+    real("cells.largest_reading", 2.0, "-", "an output above it is no reading: the cell is missing", low=0.0),
 )
 
 WHEELS: Table = (

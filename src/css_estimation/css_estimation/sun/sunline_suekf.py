@@ -27,7 +27,8 @@ from css_common.kernel import kernel
 from css_common.schema import real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, unit
 from css_estimation.sun import unscented_cycle
-from css_estimation.sun.cell_layout import informs, missing_cells
+from css_estimation.sun.cell_layout import informs, missing_cells, view_margin
+from css_estimation.sun.lit_cells import scale_of
 from css_estimation.sun.square_root import add_vector
 from css_estimation.sun.sun_heading import Aiding, SunHeading
 from css_estimation.sun.sun_tracking import turned_sun
@@ -47,10 +48,10 @@ from css_estimation.sun.unscented_cycle import (
     UnscentedParameters,
     UnscentedState,
     close_cycle,
+    direction_covariance,
     direction_of,
     is_sound,
     open_cycle,
-    reading_of,
     start,
     sure_rate,
     turn_points,
@@ -178,13 +179,16 @@ def measure(p: UnscentedParameters, cycle: Cycle, voltages, memory: UnscentedMem
     """
     cells, points = p.layout.cells, memory.points
     predicted_b = direction_of(memory)
-    missing = missing_cells(voltages)
-    level = p.gate.level * cycle.largest if p.gate.relative else p.gate.level
+    missing, covariance = missing_cells(voltages), direction_covariance(memory)
+    level = p.gate.level * scale_of(p.gate, cycle.largest)
     count = mask = 0
     for i in range(voltages.shape[0]):
-        if not informs(p.layout, i, voltages[i], level, predicted_b, missing):
+        lit = cycle.lit_mask >> i & 1 == 1
+        if not informs(
+            p.layout, i, voltages[i], level, lit, predicted_b, view_margin(p.layout, i, covariance), missing
+        ):
             continue
-        memory.readings[count] = reading_of(voltages[i])
+        memory.readings[count] = voltages[i]
         for j in range(POINTS):
             d = (points[j, 0], points[j, 1], points[j, 2])
             cosine = dot((cells[i].nx, cells[i].ny, cells[i].nz), unit(d))

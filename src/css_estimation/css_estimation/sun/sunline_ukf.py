@@ -27,7 +27,6 @@ from css_estimation.sun.unscented_cycle import (
     direction_of,
     is_sound,
     open_cycle,
-    reading_of,
     start,
     sure_rate,
     turn_points,
@@ -101,7 +100,7 @@ def measure(p: UnscentedParameters, lit_mask: int, voltages, memory: UnscentedMe
     count = 0
     for i in range(voltages.shape[0]):
         if lit_mask >> i & 1:
-            memory.readings[count] = reading_of(voltages[i])
+            memory.readings[count] = voltages[i]
             for j in range(POINTS):
                 memory.outputs[j, count] = (
                     cells[i].nx * points[j, 0] + cells[i].ny * points[j, 1] + cells[i].nz * points[j, 2]

@@ -48,9 +48,6 @@ MODE_PROPAGATING = 3
 MODE_COASTING = 4
 MODE_LOST = 5
 
-# A reading above twice the normal Sun is a fault: it must not throw the state to where rounding rules.
-_LARGEST_READING = 2.0
-
 # A light shorter or longer by this factor than the normal Sun's is none.
 _LIGHT_RANGE = 10.0
 
@@ -159,15 +156,9 @@ def open_cycle(p: UnscentedParameters, state: UnscentedState, dt: float, voltage
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, aiding)
     top = brightest(voltages)
-    _, mask = lit_cells(p.gate, voltages, top)
+    _, mask = lit_cells(p.layout, p.gate, voltages, top)
     started = state.started and dt <= p.longest_step
     return Cycle(dt, gyro_ok, top, voltages[top] if top >= 0 else 0.0, mask != 0, mask, started, gyro_ok and mask == 0)
-
-
-@kernel
-def reading_of(output: float) -> float:
-    """A cell's output within what one can be."""
-    return min(max(output, -_LARGEST_READING), _LARGEST_READING)
 
 
 @kernel

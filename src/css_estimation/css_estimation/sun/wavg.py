@@ -56,7 +56,7 @@ def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tupl
         top: result of `brightest`.
     """
     cells = layout.cells
-    lit, mask = lit_cells(gate, voltages, top)
+    lit, mask = lit_cells(layout, gate, voltages, top)
     if not lit:
         return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
     if mask == 0:
