@@ -17,7 +17,7 @@ covariance is told so: tangent variance stays, variance along the Sun line becom
 there, e^2/2, whose second moment is trace^2/2. Far from convergence the filter so stays the linear one that
 finds the Sun from anywhere; once converged it is consistent on the two axes that exist.
 
-Darkness. Without light the filter only propagates. Without gyro too, nothing is known about the motion: a
+Darkness. Without light, and with that of a Sun that sets (`fading`), the filter only propagates. Without gyro too, nothing is known about the motion: a
 larger process noise says so, and a state less certain than a fresh one is replaced at the next light.
 
 Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 tracking, 3 propagating with a
@@ -35,6 +35,7 @@ from css_common.vectors import Vec3
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout, informs, missing_cells, view_margin
 from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.fading import KNOWN_TURN, LightNow, cells_that_see, light_on, tells_light
 from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_algorithm import no_memory
@@ -46,6 +47,7 @@ from css_estimation.sun.sun_tracking import (
     elapsed,
     finish_cycle,
     gyro_usable,
+    watch_light,
 )
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.sun.wavg import weighted_average
@@ -199,6 +201,11 @@ def step(
         noise = p.process_noise if rate_known else p.process_noise_without_rate
         sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
 
+    sure = started and tells_light(tracking.light, trace(covariance))
+    light = light_on(p.layout, sun_b, voltages, cells_that_see(p.layout, sun_b)) if sure else 0.0
+    track, setting = watch_light(p.tracking, tracking, dt, aiding, lit, LightNow(light, KNOWN_TURN))
+    lit = lit and not setting
+
     mode = MODE_PROPAGATING if rate_known else MODE_COASTING
     restarted = False
     nis = 0.0
@@ -231,6 +238,7 @@ def step(
         count,
         mask,
         mode,
+        track,
     )
     shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, aiding.sky.predicted)
     tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)

@@ -137,15 +137,13 @@ def switch_axis(axis: int, memory: UnscentedMemory) -> int:
 
 
 @kernel
-def predict(
-    p: SunlineSuekfParameters, cycle: Cycle, axis: int, aiding: Aiding, memory: UnscentedMemory
-) -> tuple[bool, int]:
+def predict(p: SunlineSuekfParameters, cycle: Cycle, axis: int, memory: UnscentedMemory) -> tuple[bool, int]:
     """Moves the estimate on; gives whether it is not lost, and the axis from here on."""
     f, x = p.filter, memory.x
     axis = switch_axis(axis, memory)
     draw_points(f.points, memory)
     if cycle.steered:
-        turn_points(aiding.gyro_b, cycle.dt, memory)
+        turn_points(cycle.rate_b, cycle.dt, memory)
     else:
         for i in range(POINTS):
             move_point(memory.points[i], axis, cycle.dt)
@@ -153,8 +151,8 @@ def predict(
     sound = gather_points(f.points, (q, q, q, r, r, light), memory) and _normalise(memory)
     if cycle.steered:
         s2, s3 = rate_axes(direction_of(memory), axis)
-        x[3], x[4] = dot(aiding.gyro_b, s2), dot(aiding.gyro_b, s3)
-        sure_rate(memory.root, _RATES, f.rate_noise)
+        x[3], x[4] = dot(cycle.rate_b, s2), dot(cycle.rate_b, s3)
+        sure_rate(memory.root, _RATES, cycle.rate_variance)
     return sound and is_sound(f, x[_LIGHT], memory), axis
 
 
@@ -218,10 +216,10 @@ def step(
 ) -> tuple[UnscentedState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     f = p.filter
-    cycle = open_cycle(f, state, dt, voltages, aiding)
+    cycle = open_cycle(f, state, dt, voltages, aiding, memory)
     started, axis = cycle.started, state.axis
     if started:
-        started, axis = predict(p, cycle, axis, aiding, memory)
+        started, axis = predict(p, cycle, axis, memory)
     restarted = False
     nis, count, mask = 0.0, 0, 0
     if cycle.lit:
