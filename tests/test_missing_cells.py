@@ -43,7 +43,14 @@ def now_and_then(text: str) -> Callable[[int, str, float], str]:
 @pytest.mark.parametrize(
     ("text", "kind"),
     # the import takes fill values out; what no cell can read and is none goes on the wire
-    [("", "missing"), ("nan", "missing"), ("-9999", "missing"), ("65535", "missing"), ("-500", "impossible")],
+    [
+        ("", "missing"),
+        ("nan", "missing"),
+        ("-9999", "missing"),
+        ("65535", "missing"),
+        ("-500", "impossible"),
+        ("3", "impossible"),
+    ],
 )
 def test_a_cell_that_is_missing_now_and_then_costs_neither_line_nor_accuracy(tmp_path, text, kind):
     result = replayed(recording(tmp_path, now_and_then(text)), "ekf", "wls:gate=0")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every Sun estimator on every layout, the Sun everywhere, at rest: what the lit cells tell is what the heading must be.
+"""Every Sun estimator on every layout, the Sun everywhere, at rest: what the lit cells tell is what it must be.
 
 What is expected follows from the cells that see the Sun and from nothing else. Three with independent normals give the
 direction, one gives its own view, none gives no heading.
@@ -19,9 +19,9 @@ from css_papers.best.headings import all_layouts, directions, estimators, over_t
 COUNT, CYCLES = 60, 100
 SKY = directions(COUNT)
 KINDS = estimators()
-# filters: a cell error of 0.1 in each of 100 cycles against an error of 1 rad at the start leaves a part of 1e-4 of that
+# filters: a cell error of 0.1 in each of 100 cycles against one of 1 rad at the start leaves a part of 1e-4 of that
 CONVERGED_DEG = 0.5
-# those that do not take the normal Sun for granted have the light, or an Earth, to tell from it: their error bars say so
+# those that do not take the normal Sun for granted have a light, or an Earth, to tell from it: their error bars count
 WITH_LIGHT = (sun_filter, sunline_suekf)
 NOISE = 0.02
 
@@ -104,7 +104,7 @@ def test_no_lit_cell_gives_no_heading(flown):
 
 def test_a_layout_that_sees_the_sun_says_so(flown):
     """Above the dimmest light that an estimator takes for the Sun."""
-    kind, scene, found = flown
+    _, scene, found = flown
     bright = scene.outputs.max(axis=1) > 0.35
     assert found.valid[bright].all()
 
@@ -124,7 +124,7 @@ def test_least_norm_is_off_by_the_angle_of_the_sun_to_the_span_of_the_lit_cells(
 
 @pytest.mark.parametrize("name", [name for name in KINDS if (name, "six faces") in PAIRS])
 def test_noise_of_the_cells_is_noise_of_the_heading(name):
-    """Three components with an error of 0.02 each are off by 1.4 deg, and by twice that where cells are taken wrongly."""
+    """Two components across the Sun with an error of 0.02 each are off by 1.4 deg on average."""
     kind = KINDS[name]
     found = over_the_sky(headings.headings(kind, "six faces", SKY, noise=NOISE, cycles=CYCLES))
     quiet = over_the_sky(headings.headings(kind, "six faces", SKY, cycles=CYCLES))

@@ -93,10 +93,10 @@ def brightest(voltages) -> int:
 
 @kernel
 def missing_cells(voltages) -> int:
-    """Mask of the outputs that are missing (NaN)."""
+    """Mask of the outputs that are missing: NaN, or what no cell reads."""
     mask = 0
     for i in range(voltages.shape[0]):
-        if voltages[i] != voltages[i]:
+        if not -READABLE < voltages[i] < READABLE:
             mask |= 1 << i
     return mask
 

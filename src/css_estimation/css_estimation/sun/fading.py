@@ -5,7 +5,7 @@ A penumbra in low orbit is over in 8 s. An estimator that takes what is left of 
 directions for a rate, ends in the dark with an error that nothing corrects for half an hour. What all cells in the Sun
 have in common is their light: the factor between their outputs and the cosines of the heading, here the largest of all
 cells. A turn does not change it, but for the curve of the cells and the Earth, and that slowly; a Sun that sets takes a
-tenth of it in a second or two. From there on the heading is held, until the light is back, gone, or another one that lasts.
+tenth of it in a second or two. From there on the heading is held, until the light is back, gone, or lasts.
 
 A flight that goes by its orbit model (`eclipse.source: model`) asks that instead.
 """
@@ -19,7 +19,7 @@ from css_estimation.sun.cell_layout import READABLE, CellLayout, cosine_on, sees
 # What is left of the light of the last seconds when it fades: a filter knows from its prediction what a turn changes,
 # a heading of one cycle alone does not.
 KNOWN_TURN, UNKNOWN_TURN = 0.9, 0.75
-# [s] that the light is averaged over; for how long before it can fade, so that a rising Sun and a heading that converges
+# [s] that the light is averaged over; for how long before it can fade, so that a rising Sun and a heading's convergence
 # are over; and after which light that has faded, but not gone, is another intensity.
 _MEMORY, _SETTLED, _LASTING = 5.0, 10.0, 15.0
 # What is left of the light after a step that is none of a Sun that sets: a cell has lost it, or the heading was wrong.

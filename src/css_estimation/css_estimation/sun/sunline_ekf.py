@@ -17,8 +17,9 @@ covariance is told so: tangent variance stays, variance along the Sun line becom
 there, e^2/2, whose second moment is trace^2/2. Far from convergence the filter so stays the linear one that
 finds the Sun from anywhere; once converged it is consistent on the two axes that exist.
 
-Darkness. Without light, and with that of a Sun that sets (`fading`), the filter only propagates. Without gyro too, nothing is known about the motion: a
-larger process noise says so, and a state less certain than a fresh one is replaced at the next light.
+Darkness. Without light, and with that of a Sun that sets (`fading`), the filter only propagates. Without gyro too,
+nothing is known about the motion: a larger process noise says so, and a state less certain than a fresh one is replaced
+at the next light.
 
 Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 tracking, 3 propagating with a
 measured rate, 4 propagating without one.
