@@ -49,7 +49,7 @@ def turned(sun_b, omega, dt=DT):
 def fly_ideal(seed):
     """Errors on the tangent axes normalised (NEES), NIS and its degrees of freedom of each step."""
     rng = np.random.default_rng(seed)
-    p, state = ekf(cell_sigma=CELL_SIGMA, process_sigma=PROCESS_SIGMA, gate=1.0, dim_cells=False)
+    p, state = ekf(cell_sigma=CELL_SIGMA, process_sigma=PROCESS_SIGMA, gate=1.0)
     sun_b = rng.normal(size=3)
     sun_b = tuple((sun_b / np.linalg.norm(sun_b)).tolist())
     start_b = turned(sun_b, tuple(0.05 * rng.normal(size=3)), 1.0)

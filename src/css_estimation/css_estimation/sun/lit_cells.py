@@ -28,17 +28,19 @@ CELL_SIGMA = real(
 # A cell at the edge of its view reads the cosine of half the view, less what warp and losses take of it and what the
 # Earth adds to the brightest one.
 _AT_THE_EDGE = 0.9
+# Of the gate: below it a cell with a view of 120 deg or less, which ends there, sees the Earth alone.
+_ENDS_AT = 0.45
 
 DIM_CELLS = flag(
-    "dim_cells", True, "cells that see the Sun although they are below the gate count, where views allow it"
+    "dim_cells", True, "cells with views wider than 120 deg see the Sun below the gate too, if views allow"
 )
 
 
 def dimmest_output(values: Values) -> float:
-    """Output at the edge of view, as a share of the brightest; infinite if it does not count."""
-    if not values[DIM_CELLS]:
-        return math.inf
-    return _AT_THE_EDGE * max(0.0, math.cos(math.radians(0.5 * values.cells.field_of_view_deg)))
+    """Output at the edge of view, as a share of the brightest; infinite where no cell below a gate sees the Sun."""
+    edge = _AT_THE_EDGE * max(0.0, math.cos(math.radians(0.5 * values.cells.field_of_view_deg)))
+    # rounding must not make a view of 120 deg a wider one
+    return edge if values[DIM_CELLS] and edge < _ENDS_AT - 1e-9 else math.inf
 
 
 class Gate(NamedTuple):
@@ -50,7 +52,9 @@ class Gate(NamedTuple):
             "gate_kind", "relative", ("relative", "absolute"), "gate as a share of the brightest cell, or as an output"
         ),
     )
-    level: float = given(real("gate", 0.45, "-", "a cell above the gate sees the Sun", low=0.0, high=1.0, tunable=True))
+    level: float = given(
+        real("gate", _ENDS_AT, "-", "a cell above the gate sees the Sun", low=0.0, high=1.0, tunable=True)
+    )
     minimum_output: float = given(
         real("minimum_output", 0.1, "-", "no Sun unless a cell is above it", low=0.0, high=1.0, tunable=True)
     )
