@@ -22,10 +22,10 @@ import numpy as np
 from css_bringup.basilisk import Basilisk
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.schema import default_values
-from css_common.sections import CELLS
 from css_common.vectors import angle_between, multiply, scale
 from css_estimation.sun import sunline_suekf, sunline_ukf
 from css_estimation.sun.sun_heading import UNAIDED
+from css_sensors.cells import CELLS
 
 HOME = Path(__file__).parents[1]
 PERIOD = 0.5  # [s]

@@ -6,11 +6,13 @@ import numpy as np
 from css_common.epochs import parse_utc
 from css_common.random_streams import random_key
 from css_common.schema import Values, default_values
-from css_common.sections import MISSION, ORBIT, PAYLOAD, SLITS
+from css_common.sections import MISSION, ORBIT
 from css_environment.ephemeris import at, build_ephemeris
 from css_environment.mission_environment import mission_orbit
 from css_estimation.spin import slit_measurement
 from css_estimation.spin.slit_record import SlitRecord, read_record
+from css_sensors.payload import PAYLOAD
+from css_sensors.slits import SLITS
 from css_sim.slit_crossings import slit_crossings, slit_geometry
 from css_sim.spinning_payload import PayloadMotion, payload_motion, payload_state
 

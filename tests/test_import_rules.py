@@ -14,7 +14,7 @@ SOURCES = Path(__file__).parents[1] / "src"
 FLOORS = (
     {"css_msgs"},
     {"css_common"},
-    {"css_environment", "css_recording"},
+    {"css_environment", "css_recording", "css_sensors"},
     {"css_sim", "css_estimation", "sunpoint_control"},
     {"css_analysis"},
     {"css_bringup", "css_monte_carlo"},

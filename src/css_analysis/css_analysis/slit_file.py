@@ -9,8 +9,7 @@ import csv
 from collections.abc import Iterator
 from pathlib import Path
 
-from css_estimation.spin.slit_passage import LOWER, UPPER, VERTICAL
-from css_estimation.spin.slit_timer_counts import SPAN
+from css_sensors.slits import LOWER, TIMER_SPAN, UPPER, VERTICAL
 
 Pulse = tuple[int, int, int]
 """Slit, count and head."""
@@ -64,7 +63,7 @@ def _pulses(path: Path, lines: Iterator[tuple[int, str]], heads: int) -> Iterato
             raise SlitFileError(
                 f"{path}: line {number}: slit {values['slit'].strip()!r} given, expected upper, vertical or lower"
             )
-        count = _whole(path, number, "count", values["count"], SPAN - 1)
+        count = _whole(path, number, "count", values["count"], TIMER_SPAN - 1)
         yield slit, count, _whole(path, number, "head", values.get("head", "0"), heads - 1)
 
 

@@ -26,8 +26,9 @@ from css_estimation.attitude.sun_field_attitude import (
 )
 from css_estimation.spin import slit_measurement
 from css_estimation.spin.slit_record import SlitRecord, read_record
+from css_sensors.slits import SLITS_PER_HEAD, TIMER_SPAN, head_azimuths
 from css_sim import magnetometer, slit_timer
-from css_sim.slit_crossings import SLITS_PER_HEAD, slit_crossings, slit_geometry
+from css_sim.slit_crossings import slit_crossings, slit_geometry
 from css_sim.spinning_payload import PayloadMotion, payload_motion, payload_state
 
 WATCHED = 12.0
@@ -75,15 +76,15 @@ def _watched(
     values: Values, estimator: Values, motion: PayloadMotion, key: RandomKey, sun_n: Vec3, end: float
 ) -> SlitRecord:
     """Passages of the last seconds before `end` [s]."""
-    azimuths = np.radians(values.slits.head_azimuths_deg)
+    azimuths = head_azimuths(values)
     room = int(WATCHED * (motion.fastest / (2.0 * np.pi) + 1.0)) * SLITS_PER_HEAD * len(azimuths)
     times, slits, heads = np.zeros(room), np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
     count = slit_crossings(motion, slit_geometry(values), sun_n, end - WATCHED, end, times, slits, heads)
     ticks, codes = np.zeros(2 * room, dtype=np.int64), np.zeros((2 * room, 2), dtype=np.int64)
     pulses = slit_timer.read_pulses(slit_timer.parameters(values), key, 0, count, times, slits, heads, ticks, codes)
     read_out = zip(ticks[:pulses].tolist(), codes[:pulses].tolist(), strict=True)
-    given = [(slit, tick % slit_timer.WRAP, head) for tick, (slit, head) in read_out]
-    return read_record(slit_measurement.parameters(estimator), given, azimuths.tolist())
+    given = [(slit, tick % TIMER_SPAN, head) for tick, (slit, head) in read_out]
+    return read_record(slit_measurement.parameters(estimator), given, azimuths)
 
 
 def _attitude(

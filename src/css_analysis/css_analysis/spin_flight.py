@@ -17,6 +17,7 @@ from css_estimation.spin.coning import Passages
 from css_estimation.spin.slit_passage import REASON_NONE, REASONS
 from css_msgs.msg import AttitudeEstimate, ConingEstimate, SlitSunAngle
 from css_recording.bag_reader import BagReader
+from css_sensors.slits import counts_between, head_azimuths, timer_frequency
 
 UNNAMED = "before another one in the same cycle, which is the one that is named"
 """Reason of a refusal of which a message tells no more than that it was."""
@@ -99,12 +100,12 @@ def _reasons(angles: Sequence[Sample]) -> Counter[str]:
 
 def passages_of(angles: Sequence[Sample], values: Values) -> Passages:
     """Passages of `SlitSunAngle` messages (sections mission and slits)."""
-    epoch_ns, frequency = parse_utc(values.mission.epoch), values.slits.counter_hz
-    azimuths = np.radians(values.slits.head_azimuths_deg)
+    epoch_ns, frequency = parse_utc(values.mission.epoch), timer_frequency(values)
+    azimuths = np.asarray(head_azimuths(values))
     new = [a for a in angles if a.validity == SlitSunAngle.VALIDITY_VALID]
     time = np.array([(a.stamp_ns - epoch_ns) * 1e-9 - a.age for a in new])
     order = np.argsort(time, kind="stable")
-    upper = np.array([(a.upper - a.vertical + 2**31) % 2**32 - 2**31 for a in new]) / frequency
+    upper = np.array([counts_between(a.upper, a.vertical) for a in new]) / frequency
     columns = (
         time,
         np.array([a.sun_angle for a in new]),

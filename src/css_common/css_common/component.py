@@ -10,12 +10,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from css_common import sections
 from css_common.codec import Sample
 from css_common.epochs import parse_utc
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
-from css_common.sections import SECTIONS
+from css_common.shared_sections import conflicts, section_table
 
 if TYPE_CHECKING:
     from css_common.mission import Node
@@ -116,7 +115,7 @@ class Component:
         report: takes a line for the log; a host makes it the node's.
 
     Class attributes:
-        shared: mission sections whose values the component reads (`sections.SECTIONS`), besides mission and io.
+        shared: mission sections whose values the component reads (`shared_sections`), besides mission and io.
         parameters: its own parameters.
     """
 
@@ -140,7 +139,7 @@ class Component:
     def table(cls) -> Table:
         """All parameters of the node: shared sections first, then its own."""
         sections = dict.fromkeys((*cls._read_by_host, *cls.shared))
-        return tuple(p for section in sections for p in SECTIONS[section]) + tuple(cls.parameters)
+        return tuple(p for section in sections for p in section_table(section)) + tuple(cls.parameters)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -235,5 +234,5 @@ def missing_values(component_type: type[Component], values: Values) -> Iterator[
 def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:
     """What is wrong between the values of a component; what is missing comes first, for the rest builds on it."""
     yield from missing_values(component_type, values)
-    yield from sections.conflicts(values)
+    yield from conflicts(values)
     yield from component_type.conflicts(values)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 KERNEL_PACKAGES = (
     "css_common",
+    "css_sensors",
     "css_environment",
     "css_sim",
     "css_estimation",
@@ -23,7 +24,7 @@ KERNEL_PACKAGES = (
     "css_monte_carlo",
     "css_papers",
 )
-_CALLED_BY_TYPE = KERNEL_PACKAGES[:5]  # nothing calls upwards
+_CALLED_BY_TYPE = KERNEL_PACKAGES[:6]  # nothing calls upwards
 
 # what stands at the beginning of a line: kernels are compiled with the names of their module
 _IMPORT = re.compile(r"^(?:from +([\w.]+) +import +(\([^)]*\)|.+)|import +(.+))$", re.MULTILINE)

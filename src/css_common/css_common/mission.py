@@ -14,7 +14,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from css_common import sections
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
 from css_common.epochs import parse_utc
@@ -44,6 +43,7 @@ from css_common.schema import (
     shown,
     unknown_name,
 )
+from css_common.shared_sections import conflicts, shared_parameters
 
 __all__ = [
     "SHARED",
@@ -57,8 +57,6 @@ __all__ = [
     "mission_from_text",
 ]
 
-_SHARED_TABLE = tuple(p for table in sections.SECTIONS.values() for p in table)
-_SHARED_NAMES = {p.name: p for p in _SHARED_TABLE}
 _SCRIPTS = ("events.", "criteria.")
 _OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
 _MOST_NODES = 64
@@ -118,11 +116,12 @@ class Mission:
         self.namespace = namespace
         self._alone = alone
         given = shared_by_all(parameters, namespace)
-        shared = {key: value for key, value in given.items() if key in _SHARED_NAMES}
+        known = shared_parameters()
+        shared = {key: value for key, value in given.items() if key in known}
         with _naming(origin, SHARED):
-            self.shared = checked_values(_SHARED_TABLE, shared)
-            self.values = shaped_values(_SHARED_TABLE, self.shared)
-            _refuse(sections.conflicts(self.values))
+            self.shared = checked_values(known.values(), shared)
+            self.values = shaped_values(known.values(), self.shared)
+            _refuse(conflicts(self.values))
         self.nodes = self._build_nodes()
         tables = {node.name: node.component.table() for node in self.nodes}
         self._check_keys(tables if guest is None else tables | {guest[0]: guest[1].table()})
@@ -262,10 +261,11 @@ class Mission:
 
     def _find(self, key: str) -> tuple[str | None, Parameter]:
         """The node that a parameter belongs to, None when all share it, and its specification."""
-        if key in _SHARED_NAMES:
-            return None, _SHARED_NAMES[key]
+        shared = shared_parameters()
+        if key in shared:
+            return None, shared[key]
         head, _, rest = key.partition(".")
-        known = [*_SHARED_NAMES]
+        known = [*shared]
         for node in self.nodes:
             for parameter in node.component.table():
                 if node.name == head and parameter.name == rest:
@@ -298,7 +298,7 @@ class Mission:
                     f"of graph.nodes: {', '.join(tables)})"
                 )
             known = {p.name: p for name in names for p in tables[name]} | _OF_ROS
-            known |= _SHARED_NAMES if shared else {}
+            known |= shared_parameters() if shared else {}
             for key, value in parameters.items():
                 if key.startswith("qos_overrides.") or (shared and key.startswith(_SCRIPTS)):
                     continue
@@ -389,8 +389,8 @@ def _naming(origin: str, section: str) -> Iterator[None]:
         raise MissionError(f"{origin}: {section}: {error}") from error
 
 
-def _refuse(conflicts: Iterable[str]) -> None:
-    for conflict in conflicts:
+def _refuse(found: Iterable[str]) -> None:
+    for conflict in found:
         raise ParameterError(conflict)
 
 

@@ -22,7 +22,7 @@ from css_common.parameter_sections import (
     shared_by_all,
 )
 from css_common.schema import ParameterError, nearest, shown, unknown_name
-from css_common.sections import SECTIONS
+from css_common.shared_sections import shared_parameters
 
 _NAMING = re.compile(r"(?:(\w+):)?__(node|name|ns):=(.*)", re.DOTALL)
 _NODE = re.compile(r"[A-Za-z]\w*", re.ASCII)
@@ -36,7 +36,6 @@ USUAL_GRAPH = (
     "sunpoint_control/mrp_control",
 )
 """What a node takes to be around it that is started without a mission."""
-_SHARED_NAMES = frozenset(p.name for table in SECTIONS.values() for p in table)
 
 
 @dataclass
@@ -163,7 +162,7 @@ def _of_one_node(
         if not is_for(section, given.name, given.namespace):
             continue
         shared = is_shared(section, given.namespace)
-        known = own | _SHARED_NAMES if shared else own
+        known = own | shared_parameters().keys() if shared else own
         for key in parameters:
             if key in known or belongs_to_ros(key) or key.startswith(("events.", "criteria.")):
                 continue
@@ -171,7 +170,7 @@ def _of_one_node(
                 raise MissionError(f"{origin}: {section}: {unknown_name(key, known)}")
     for_all = shared_by_all(sections, given.namespace)
     for_it = given_to(sections, given.name, given.namespace)
-    shared_keys = {key: value for key, value in for_all.items() if key in _SHARED_NAMES}
+    shared_keys = {key: value for key, value in for_all.items() if key in shared_parameters()}
     own_keys = {key: value for key, value in for_it.items() if key in own}
     graph = _graph_with(component_type, given.name)
     return {SHARED: shared_keys | graph, f"{given.namespace.rstrip('/')}/{given.name}": own_keys}

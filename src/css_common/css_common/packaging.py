@@ -10,13 +10,16 @@ from pathlib import Path
 
 from setuptools import find_packages, setup
 
+from css_common.places import SECTIONS_INDEX
 
-def ros_package(setup_file: str, data_files: Sequence[tuple[str, list[str]]] = ()) -> None:
+
+def ros_package(setup_file: str, data_files: Sequence[tuple[str, list[str]]] = (), *, sections: bool = False) -> None:
     """Declares the package of a `setup.py`: every file in `nodes/` and `commands/` is an executable of its name.
 
     Args:
         setup_file: `__file__` of the `setup.py`, beside which package.xml lies.
         data_files: further files, as setuptools takes them; `{share}` is the package's folder of data.
+        sections: the package brings mission sections (`SECTIONS` in its module `sections`).
     """
     folder = Path(setup_file).parent
     manifest = ET.parse(folder / "package.xml").getroot()
@@ -33,6 +36,7 @@ def ros_package(setup_file: str, data_files: Sequence[tuple[str, list[str]]] = (
         data_files=[
             ("share/ament_index/resource_index/packages", [f"resource/{package}"]),
             (share, ["package.xml"]),
+            *([(SECTIONS_INDEX, [f"resource/{package}"])] if sections else []),
             *((place.format(share=share), files) for place, files in data_files),
         ],
         entry_points={"console_scripts": _executables(folder / package)},

@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 HOME = "SUNPOINT_HOME"
+SECTIONS_INDEX = "share/ament_index/resource_index/sunpoint_sections"
+"""Where a package that brings sections of missions leaves a mark, below the folder that it is installed in."""
 
 
 def home() -> Path:

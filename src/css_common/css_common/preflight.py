@@ -15,9 +15,8 @@ from css_common.component import Component, Finding, missing_values
 from css_common.mission import SHARED, Mission, Node
 from css_common.mission_file import MissionError
 from css_common.schema import shaped_values
-from css_common.sections import SECTIONS
+from css_common.shared_sections import shared_parameters
 
-_SHARED_KEYS = frozenset(p.name for table in SECTIONS.values() for p in table)
 _reported: dict[str, None] = {}
 
 
@@ -78,7 +77,7 @@ def _stages(mission: Mission) -> Iterator[tuple[str, Mapping[str, Node]]]:
 
 def _line(mission: Mission, node: Node, finding: Finding) -> str:
     key = finding.text.partition(":")[0]
-    return f"{mission.origin}: {SHARED if key in _SHARED_KEYS else node.name}: {finding.text}"
+    return f"{mission.origin}: {SHARED if key in shared_parameters() else node.name}: {finding.text}"
 
 
 def _events_too_late(mission: Mission) -> Iterator[str]:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Mission sections that several nodes share, with the checks that one value alone cannot pass or fail.
+"""Mission sections that any mission may have, with the checks that one value alone cannot pass or fail.
 
-They stand under `/**` in a mission file. Defaults are nobody's spacecraft: what no two have in common is empty until a
-mission says it, and components that need it ask for it (`Component.needed`).
+They stand under `/**` in a mission file, like those that other packages bring (`css_common.shared_sections`). Defaults
+are nobody's spacecraft: what no two have in common is empty until a mission says it, and components that need it ask
+for it (`Component.needed`).
 """
 
 import math
@@ -15,6 +16,7 @@ from css_common.codec import MAX_FRAME
 from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
 from css_common.schema import Table, Values, choice, flag, integer, real, reals, shown, text, texts
+from css_common.section import Section, unit_rows
 
 _LAST_STAMP_NS = 2**31 * 1_000_000_000
 _NAME = re.compile(r"\w[\w !#$%&'()+,\-.;=@\[\]^`{}~]*")  # nothing that a file system takes for its own
@@ -22,26 +24,58 @@ _LONGEST_NAME = 100  # [bytes] with what is added to it a file name of 255 bytes
 _MOST_STEPS = 10**9
 _LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
+EPOCH = text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step")
+DURATION = real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7)
+PERIOD = real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0)
+SEED = integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1)
+CASE = integer("mission.case", 0, "-", "case number within the seed", low=0, high=2**32 - 1)
+
 MISSION: Table = (
     text("mission.name", "unnamed", "name of the mission, as in the file name"),
     text("mission.description", "", "one line for reports"),
-    text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step"),
-    real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7),
-    real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0),
-    integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1),
-    integer("mission.case", 0, "-", "case number within the seed", low=0, high=2**32 - 1),
+    EPOCH,
+    DURATION,
+    PERIOD,
+    SEED,
+    CASE,
+)
+
+ORBIT_SOURCE = choice(
+    "orbit.source",
+    "none",
+    ("none", "elements", "tle", "ballistic"),
+    "what defines the orbit",
+    example="orbit: {source: elements, altitude: 400.0e+3, inclination_deg: 51.6}",
+)
+ALTITUDE = real("orbit.altitude", 0.0, "m", "semi-major axis above the equatorial radius", low=0.0, high=1e9)
+ECCENTRICITY = real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9)
+LAUNCH_LATITUDE = real(
+    "orbit.launch.latitude_deg",
+    69.29,
+    "deg",
+    "geodetic latitude where a ballistic arc begins",
+    low=-90.0,
+    high=90.0,
+)
+LAUNCH_LONGITUDE = real("orbit.launch.longitude_deg", 16.02, "deg", "its longitude, east", low=-180.0, high=360.0)
+LAUNCH_HEIGHT = real("orbit.launch.height", 0.0, "m", "its height above the ellipsoid", low=-500.0, high=100e3)
+LAUNCH_AZIMUTH = real(
+    "orbit.launch.azimuth_deg",
+    330.0,
+    "deg",
+    "direction of the arc's start from north over east",
+    low=-360.0,
+    high=360.0,
+)
+LAUNCH_ELEVATION = real("orbit.launch.elevation_deg", 80.0, "deg", "its elevation", low=10.0, high=90.0)
+LAUNCH_APOGEE = real(
+    "orbit.launch.apogee", 169e3, "m", "height of its apogee above the ellipsoid", low=1e3, high=2000e3
 )
 
 ORBIT: Table = (
-    choice(
-        "orbit.source",
-        "none",
-        ("none", "elements", "tle", "ballistic"),
-        "what defines the orbit",
-        example="orbit: {source: elements, altitude: 400.0e+3, inclination_deg: 51.6}",
-    ),
-    real("orbit.altitude", 0.0, "m", "semi-major axis above the equatorial radius", low=0.0, high=1e9),
-    real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9),
+    ORBIT_SOURCE,
+    ALTITUDE,
+    ECCENTRICITY,
     real("orbit.inclination_deg", 0.0, "deg", "to the mean equator J2000", low=0.0, high=180.0),
     real("orbit.raan_deg", 0.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
     real("orbit.argument_of_perigee_deg", 0.0, "deg", "argument of perigee", low=-360.0, high=360.0),
@@ -49,155 +83,70 @@ ORBIT: Table = (
     flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
     text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
     text("orbit.tle_line2", "", "second line of the element set"),
-    real(
-        "orbit.launch.latitude_deg",
-        69.29,
-        "deg",
-        "geodetic latitude where a ballistic arc begins",
-        low=-90.0,
-        high=90.0,
-    ),
-    real("orbit.launch.longitude_deg", 16.02, "deg", "its longitude, east", low=-180.0, high=360.0),
-    real("orbit.launch.height", 0.0, "m", "its height above the ellipsoid", low=-500.0, high=100e3),
-    real(
-        "orbit.launch.azimuth_deg",
-        330.0,
-        "deg",
-        "direction of the arc's start from north over east",
-        low=-360.0,
-        high=360.0,
-    ),
-    real("orbit.launch.elevation_deg", 80.0, "deg", "its elevation", low=10.0, high=90.0),
-    real("orbit.launch.apogee", 169e3, "m", "height of its apogee above the ellipsoid", low=1e3, high=2000e3),
+    LAUNCH_LATITUDE,
+    LAUNCH_LONGITUDE,
+    LAUNCH_HEIGHT,
+    LAUNCH_AZIMUTH,
+    LAUNCH_ELEVATION,
+    LAUNCH_APOGEE,
 )
+
+INERTIA = reals(
+    "spacecraft.inertia",
+    (),
+    "kg m^2",
+    "inertia matrix about the centre of mass, wheels included, row-major",
+    length=9,
+    columns=3,
+    example="spacecraft: {inertia: [10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75]}",
+)
+ARRAY_NORMAL = reals("spacecraft.array_normal", (0.0, 0.0, 1.0), "-", "normal of the solar arrays in b", length=3)
 
 SPACECRAFT: Table = (
-    reals(
-        "spacecraft.inertia",
-        (),
-        "kg m^2",
-        "inertia matrix about the centre of mass, wheels included, row-major",
-        length=9,
-        columns=3,
-        example="spacecraft: {inertia: [10.5, 0.0, 0.0, 0.0, 8.0, 0.0, 0.0, 0.0, 6.75]}",
-    ),
-    reals("spacecraft.array_normal", (0.0, 0.0, 1.0), "-", "normal of the solar arrays in b", length=3),
+    INERTIA,
+    ARRAY_NORMAL,
 )
 
-CELLS: Table = (
-    reals(
-        "cells.normals",
-        (),
-        "-",
-        "outward normals of the coarse sun sensor cells in b, at most 32 rows of x, y, z",
-        columns=3,
-        example="cells: {normals: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
-    ),
-    real("cells.field_of_view_deg", 180.0, "deg", "full cone of view of a cell", low=1.0, high=180.0),
-    reals(
-        "cells.clip_normal",
-        (0.0, 0.0, 0.0),
-        "-",
-        "normal of the body plane that hides the other half space from each cell; zeros: no such plane",
-        length=3,
-    ),
-    real("cells.smallest_reading", -10.0, "-", "an output below it is no reading: the cell is missing", high=0.0),
-    real("cells.largest_reading", 2.0, "-", "an output above it is no reading: the cell is missing", low=0.0),
+WHEELS_FITTED = flag(
+    "wheels.fitted", True, "the spacecraft carries reaction wheels; without them it flies uncontrolled"
 )
+WHEEL_AXES = reals(
+    "wheels.axes",
+    (),
+    "-",
+    "spin axes of the reaction wheels in b, one row of x, y, z each",
+    columns=3,
+    example="wheels: {axes: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
+)
+WHEEL_INERTIA = real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True)
+WHEEL_MAX_TORQUE = real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0)
+WHEEL_MAX_SPEED = real("wheels.max_speed_rpm", 6000.0, "rpm", "speed limit of each wheel", low=0.0)
 
 WHEELS: Table = (
-    flag("wheels.fitted", True, "the spacecraft carries reaction wheels; without them it flies uncontrolled"),
-    reals(
-        "wheels.axes",
-        (),
-        "-",
-        "spin axes of the reaction wheels in b, one row of x, y, z each",
-        columns=3,
-        example="wheels: {axes: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
-    ),
-    real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True),
-    real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0),
-    real("wheels.max_speed_rpm", 6000.0, "rpm", "speed limit of each wheel", low=0.0),
+    WHEELS_FITTED,
+    WHEEL_AXES,
+    WHEEL_INERTIA,
+    WHEEL_MAX_TORQUE,
+    WHEEL_MAX_SPEED,
 )
+
+RODS_FITTED = flag("rods.fitted", False, "the spacecraft carries magnetic torque rods")
+ROD_AXES = reals(
+    "rods.axes", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), "-", "rod axes in b, a row each", columns=3
+)
+ROD_MAX_DIPOLE = real("rods.max_dipole", 20.0, "A m^2", "dipole limit of each rod", low=0.0)
 
 RODS: Table = (
-    flag("rods.fitted", False, "the spacecraft carries magnetic torque rods"),
-    reals("rods.axes", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), "-", "rod axes in b, a row each", columns=3),
-    real("rods.max_dipole", 20.0, "A m^2", "dipole limit of each rod", low=0.0),
+    RODS_FITTED,
+    ROD_AXES,
+    ROD_MAX_DIPOLE,
 )
 
-MAGNETOMETER: Table = (
-    integer("magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000),
+FIELD_DIVIDER = integer(
+    "magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000
 )
 
-PAYLOAD: Table = (
-    real(
-        "payload.axis_azimuth_deg",
-        330.0,
-        "deg",
-        "angular momentum at the epoch, from north over east",
-        low=-360.0,
-        high=360.0,
-    ),
-    real("payload.axis_elevation_deg", 80.0, "deg", "its elevation", low=-90.0, high=90.0),
-    reals(
-        "payload.phase_starts",
-        (0.0,),
-        "s",
-        "when a phase of torque-free motion begins, after the epoch",
-        low=0.0,
-        high=1e5,
-    ),
-    reals("payload.spin_hz", (5.45,), "Hz", "turns a second relative to the Sun in each phase", low=0.01, high=50.0),
-    reals(
-        "payload.coning_period",
-        (0.2618,),
-        "s",
-        "turn of the spin axis about the angular momentum in each phase",
-        low=0.01,
-        high=1e3,
-    ),
-    reals(
-        "payload.coning_angle_deg",
-        (12.89,),
-        "deg",
-        "full angle of the cone of the spin axis in each phase",
-        low=0.0,
-        high=120.0,
-    ),
-    real(
-        "payload.final_coning_period",
-        0.0,
-        "s",
-        "to which the period of the last phase drifts by its end; 0: it stays",
-        low=0.0,
-        high=1e3,
-    ),
-    real("payload.flat_spin_start", 1e5, "s", "when the cone of the last phase begins to open", low=0.0, high=1e5),
-    real("payload.flat_spin_rate_deg_s", 4.0, "deg/s", "growth of its half angle", low=0.1, high=90.0),
-    real("payload.flat_spin_angle_deg", 85.0, "deg", "half angle at which it ends", low=1.0, high=89.9),
-)
-
-SLITS: Table = (
-    real("slits.counter_hz", 1e6, "Hz", "frequency of the timer", low=1e3, high=1e9),
-    real("slits.inclination_deg", 30.0, "deg", "of the two slanted slits to the spin axis", low=5.0, high=85.0),
-    real(
-        "slits.field_of_view_deg",
-        120.0,
-        "deg",
-        "range of Sun angles over which a slit is lit, about the equator",
-        low=2.0,
-        high=179.0,
-    ),
-    reals(
-        "slits.head_azimuths_deg",
-        (0.0,),
-        "deg",
-        "places of the sensor heads around the spin axis, at most 8",
-        low=-360.0,
-        high=360.0,
-    ),
-)
+MAGNETOMETER: Table = (FIELD_DIVIDER,)
 
 MEASURES: Table = (
     real(
@@ -283,22 +232,6 @@ IO: Table = (
     flag("autostart", True, "configure and activate without being asked"),
 )
 
-SECTIONS: dict[str, Table] = {
-    "mission": MISSION,
-    "orbit": ORBIT,
-    "spacecraft": SPACECRAFT,
-    "cells": CELLS,
-    "wheels": WHEELS,
-    "rods": RODS,
-    "magnetometer": MAGNETOMETER,
-    "payload": PAYLOAD,
-    "slits": SLITS,
-    "measures": MEASURES,
-    "graph": GRAPH,
-    "lockstep": LOCKSTEP,
-    "io": IO,
-}
-
 
 def name_for_files(text: str) -> str:
     """A text made a `mission.name`: what no name may hold becomes `_`, and what is too long is cut off."""
@@ -310,38 +243,26 @@ def name_for_files(text: str) -> str:
 
 def wheel_axes(values: Values) -> np.ndarray:
     """Spin axes (N, 3) of the reaction wheels that the spacecraft carries, in b; none without wheels."""
-    return values.wheels.axes if values.wheels.fitted else np.zeros((0, 3))
+    return values[WHEEL_AXES] if values[WHEELS_FITTED] else np.zeros((0, 3))
 
 
-def conflicts(values: Values) -> Iterator[str]:
-    """What is wrong between the values of the shared sections, one message each: key, value, what was expected."""
-    if hasattr(values, "mission"):
-        yield from _mission_conflicts(values.mission)
-    if hasattr(values, "orbit"):
-        yield from _orbit_conflicts(values.orbit)
-    if hasattr(values, "spacecraft"):
-        yield from _spacecraft_conflicts(values.spacecraft)
-    if hasattr(values, "cells"):
-        if len(values.cells.normals):
-            yield from _unit_rows("cells.normals", values.cells.normals, 1, 32)
-        clip = np.linalg.norm(values.cells.clip_normal)
-        if clip != 0.0 and abs(clip - 1.0) > 1e-6:
-            yield f"cells.clip_normal: length {clip:.6g} given, expected a unit vector or zeros"
-    if hasattr(values, "wheels") and len(values.wheels.axes):
-        yield from _unit_rows("wheels.axes", values.wheels.axes, 3, 32)
-        rank = np.linalg.matrix_rank(values.wheels.axes) if values.wheels.axes.size else 0
-        if rank < 3:
-            yield f"wheels.axes: they span {rank} of 3 directions, expected axes that span all"
-    if hasattr(values, "rods"):
-        yield from _unit_rows("rods.axes", values.rods.axes, 1, 32)
-    if hasattr(values, "payload"):
-        yield from _payload_conflicts(values.payload)
-    if hasattr(values, "slits"):
-        yield from _slits_conflicts(values.slits)
-    if hasattr(values, "io"):
-        for key in ("body_frame", "inertial_frame"):
-            if len(getattr(values.io, key).encode()) >= MAX_FRAME:
-                yield f"io.{key}: expected a name shorter than {MAX_FRAME} bytes"
+def _wheels_conflicts(wheels: Values) -> Iterator[str]:
+    if not len(wheels.axes):
+        return
+    yield from unit_rows("wheels.axes", wheels.axes, 3, 32)
+    rank = np.linalg.matrix_rank(wheels.axes) if wheels.axes.size else 0
+    if rank < 3:
+        yield f"wheels.axes: they span {rank} of 3 directions, expected axes that span all"
+
+
+def _rods_conflicts(rods: Values) -> Iterator[str]:
+    yield from unit_rows("rods.axes", rods.axes, 1, 32)
+
+
+def _io_conflicts(io: Values) -> Iterator[str]:
+    for key in ("body_frame", "inertial_frame"):
+        if len(getattr(io, key).encode()) >= MAX_FRAME:
+            yield f"io.{key}: expected a name shorter than {MAX_FRAME} bytes"
 
 
 def _mission_conflicts(mission: Values) -> Iterator[str]:
@@ -411,38 +332,15 @@ def _inertia_conflicts(inertia: np.ndarray) -> Iterator[str]:
         )
 
 
-def _payload_conflicts(payload: Values) -> Iterator[str]:
-    starts = payload.phase_starts
-    if not len(starts) or starts[0] != 0.0 or np.any(np.diff(starts) <= 0.0):
-        yield f"payload.phase_starts: {starts.tolist()} given, expected times that grow from 0.0"
-        return
-    for key in ("spin_hz", "coning_period", "coning_angle_deg"):
-        given = getattr(payload, key)
-        if len(given) != len(starts):
-            yield f"payload.{key}: {len(given)} values given, expected {len(starts)}, one for each phase"
-            return
-    for key, period in (("coning_period", payload.coning_period), ("final_coning_period", payload.final_coning_period)):
-        # the ratio of axial to transverse moment of inertia, which no body has above 2
-        ratio = 1.0 / (payload.spin_hz * np.where(period == 0.0, payload.coning_period, period))
-        if np.any(ratio >= 2.0):
-            yield f"payload.{key}: the coning is {ratio.max():.3g} times as fast as the spin, expected less than 2"
-    if payload.flat_spin_start <= starts[-1]:
-        yield f"payload.flat_spin_start: {payload.flat_spin_start:g} given, expected a time after the last phase begins"
-    if 2.0 * payload.flat_spin_angle_deg <= payload.coning_angle_deg[-1]:
-        yield "payload.flat_spin_angle_deg: expected more than half the coning angle of the last phase"
-
-
-def _slits_conflicts(slits: Values) -> Iterator[str]:
-    heads = slits.head_azimuths_deg
-    if not 1 <= len(heads) <= 8:
-        yield f"slits.head_azimuths_deg: {len(heads)} given, expected 1 to 8"
-    elif len(np.unique(np.round(np.mod(heads, 360.0), 6))) != len(heads):
-        yield "slits.head_azimuths_deg: two heads at one place, expected different azimuths"
-
-
-def _unit_rows(name: str, rows: np.ndarray, least: int, most: int) -> Iterator[str]:
-    if not least <= len(rows) <= most:
-        yield f"{name}: {len(rows)} rows given, expected {least} to {most}"
-    for i, length in enumerate(np.linalg.norm(rows, axis=1)):
-        if abs(length - 1.0) > 1e-6:
-            yield f"{name}: row {i} has length {length:.6g}, expected unit vectors"
+SECTIONS: dict[str, Section] = {
+    "mission": Section(MISSION, _mission_conflicts),
+    "orbit": Section(ORBIT, _orbit_conflicts),
+    "spacecraft": Section(SPACECRAFT, _spacecraft_conflicts),
+    "wheels": Section(WHEELS, _wheels_conflicts),
+    "rods": Section(RODS, _rods_conflicts),
+    "magnetometer": Section(MAGNETOMETER),
+    "measures": Section(MEASURES),
+    "graph": Section(GRAPH),
+    "lockstep": Section(LOCKSTEP),
+    "io": Section(IO, _io_conflicts),
+}

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from css_common.mission import Mission, find_mission, load_mission, mission_from_text
 from css_common.mission_file import MissionError, read_text
+from css_common.places import SECTIONS_INDEX
 from css_common.sections import name_for_files
 
 HEAD = """\
@@ -302,7 +303,10 @@ def test_overrides(override):
 def test_files_that_are_not_there(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SUNPOINT_HOME", str(tmp_path))
-    monkeypatch.setenv("AMENT_PREFIX_PATH", "")
+    brings_cells = tmp_path / "install" / "css_sensors"
+    (brings_cells / SECTIONS_INDEX).mkdir(parents=True)
+    (brings_cells / SECTIONS_INDEX / "css_sensors").touch()
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(brings_cells))
     with pytest.raises(MissionError, match=r"^missing\.yaml: no such mission file$"):
         load_mission("missing.yaml")
     with pytest.raises(MissionError, match=r"^\./missing: no such mission file$"):

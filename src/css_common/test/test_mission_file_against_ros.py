@@ -7,9 +7,9 @@ import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 
-from css_common import sections
 from css_common.mission_file import MissionError, dump_sections, flattened, read_sections
 from css_common.schema import default_values
+from css_common.shared_sections import shared_parameters
 
 
 @pytest.fixture
@@ -97,7 +97,7 @@ def test_what_ros_refuses_does_not_pass_here_either(read_by_ros, text):
 
 
 def test_written_missions_are_read_the_same(read_by_ros):
-    parameters = {p.name: p.default for table in sections.SECTIONS.values() for p in table if p.default not in ([], ())}
+    parameters = {p.name: p.default for p in shared_parameters().values() if p.default not in ([], ())}
     parameters |= {
         "mission.description": "1e4",
         "mission.name": "y",
@@ -110,6 +110,5 @@ def test_written_missions_are_read_the_same(read_by_ros):
 
 
 def test_defaults_hold_nothing_that_a_file_could_not():
-    for table in sections.SECTIONS.values():
-        for _, value in default_values(table).items():
-            assert value is not None
+    for _, value in default_values(shared_parameters().values()).items():
+        assert value is not None

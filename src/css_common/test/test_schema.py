@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from css_common import sections
 from css_common.schema import (
     ParameterError,
     Values,
@@ -23,7 +22,6 @@ from css_common.schema import (
     nested,
     real,
     reals,
-    shaped_values,
     text,
     texts,
     unknown_name,
@@ -189,78 +187,9 @@ def test_nested_values_are_plain_attributes():
     assert isinstance(values.a, Values)
 
 
-@pytest.mark.parametrize("name", sections.SECTIONS)
-def test_every_shared_default_passes_its_own_check(name):
-    table = sections.SECTIONS[name]
-    canonical = checked_values(table, {})
-    for parameter in table:
-        assert parameter.check(parameter.default) == canonical[parameter.name]
-        assert parameter.description
-        assert parameter.unit
-        if parameter.kind == "real" and parameter.name.endswith("_deg"):
-            assert parameter.unit == "deg"
-    assert list(sections.conflicts(shaped_values(table, canonical))) == []
-
-
-def test_shared_names_are_unique_and_stand_in_their_section():
-    names = [p.name for table in sections.SECTIONS.values() for p in table]
-    assert len(set(names)) == len(names)
-    for section, table in sections.SECTIONS.items():
-        assert all(p.name.startswith(f"{section}.") or p.name == "autostart" for p in table)
-
-
-ORBIT = {"orbit__source": "elements", "orbit__altitude": 400e3}
-CONFLICTS = [
-    ("orbit", {"orbit__source": "elements"}, "orbit.altitude: missing, expected a number [m], at least 100000"),
-    ("orbit", {**ORBIT, "orbit__altitude": 5e4}, "orbit.altitude: 50000 given, expected a number [m], at least 100000"),
-    ("mission", {"mission__epoch": "tomorrow"}, "mission.epoch: 'tomorrow' is not a UTC instant"),
-    ("mission", {"mission__epoch": "1969-12-31T00:00:00Z"}, "mission.epoch: "),
-    ("mission", {"mission__epoch": "2038-01-19T03:00:00Z"}, "mission.epoch: "),
-    ("orbit", {"orbit__source": "tle"}, "orbit.tle_line1: expected the 69 characters"),
-    (
-        "orbit",
-        {**ORBIT, "orbit__eccentricity": 0.5},
-        "0.5 given, which with orbit.altitude 400000 m puts",
-    ),
-    ("orbit", {**ORBIT, "orbit__eccentricity": 0.05}, "at 61 km; expected at most 0.0442, a perigee of 100 km"),
-    ("spacecraft", {"spacecraft__inertia": [1.0, 0.1, 0, 0, 1, 0, 0, 0, 1]}, "spacecraft.inertia: not symmetric"),
-    ("spacecraft", {"spacecraft__inertia": [1.0, 0, 0, 0, -1, 0, 0, 0, 1]}, "spacecraft.inertia: eigenvalue -1 given"),
-    ("spacecraft", {"spacecraft__inertia": [1.0, 0, 0, 0, 1, 0, 0, 0, 3]}, "break the triangle inequality"),
-    ("spacecraft", {"spacecraft__array_normal": [0, 0, 0.5]}, "spacecraft.array_normal: length 0.5 given"),
-    ("cells", {"cells__normals": [1, 0, 0] * 33}, "cells.normals: 33 rows given, expected 1 to 32"),
-    ("cells", {"cells__normals": [1, 0, 0, 0, 2, 0]}, "cells.normals: row 1 has length 2"),
-    ("cells", {"cells__clip_normal": [0, 0, 0.1]}, "cells.clip_normal: length 0.1 given"),
-    ("wheels", {"wheels__axes": [1, 0, 0, 0, 1, 0]}, "wheels.axes: 2 rows given, expected 3 to 32"),
-    ("wheels", {"wheels__axes": [1, 0, 0, 0, 1, 0, 0, -1, 0]}, "wheels.axes: they span 2 of 3 directions"),
-    ("rods", {"rods__axes": [1, 1, 0]}, "rods.axes: row 0 has length 1.41421"),
-    ("io", {"io__body_frame": "b" * 256}, "io.body_frame: "),
-    ("io", {"io__inertial_frame": "ä" * 128}, "io.inertial_frame: "),
-]
-
-
-@pytest.mark.parametrize(("section", "changes", "expected"), CONFLICTS)
-def test_values_that_conflict_are_named(section, changes, expected):
-    changes = {k: [float(x) for x in v] if isinstance(v, list) else v for k, v in changes.items()}
-    found = list(sections.conflicts(default_values(sections.SECTIONS[section], **changes)))
-    assert any(expected in line for line in found), found
-    assert all("\n" not in line for line in found)
-
-
-def test_inertia_of_a_flat_plate_passes():
-    plate = [1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 3.0]
-    assert not list(sections.conflicts(default_values(sections.SPACECRAFT, spacecraft__inertia=plate)))
-
-
 def test_specifications_cannot_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
         GAIN.low = -1.0
-
-
-def test_a_spacecraft_without_wheels_has_no_axes():
-    axes = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    fitted, bare = (default_values(sections.WHEELS, wheels__fitted=word, wheels__axes=axes) for word in (True, False))
-    assert sections.wheel_axes(fitted).shape == (3, 3)
-    assert sections.wheel_axes(bare).shape == (0, 3)
 
 
 def test_what_has_no_default_is_missing_until_it_is_given():

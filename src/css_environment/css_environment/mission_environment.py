@@ -10,6 +10,14 @@ from functools import lru_cache
 from css_common.epochs import parse_utc
 from css_common.kernel import typed_call
 from css_common.schema import Values
+from css_common.sections import (
+    LAUNCH_APOGEE,
+    LAUNCH_AZIMUTH,
+    LAUNCH_ELEVATION,
+    LAUNCH_HEIGHT,
+    LAUNCH_LATITUDE,
+    LAUNCH_LONGITUDE,
+)
 from css_environment import ephemeris
 from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS
@@ -24,14 +32,13 @@ _arc = lru_cache(maxsize=4)(ballistic_arc)
 
 def mission_launch(values: Values) -> Launch:
     """The start of a mission's ballistic arc (section orbit)."""
-    launch = values.orbit.launch
     return Launch(
-        latitude=math.radians(launch.latitude_deg),
-        longitude=math.radians(launch.longitude_deg),
-        height=launch.height,
-        azimuth=math.radians(launch.azimuth_deg),
-        elevation=math.radians(launch.elevation_deg),
-        apogee=launch.apogee,
+        latitude=math.radians(values[LAUNCH_LATITUDE]),
+        longitude=math.radians(values[LAUNCH_LONGITUDE]),
+        height=values[LAUNCH_HEIGHT],
+        azimuth=math.radians(values[LAUNCH_AZIMUTH]),
+        elevation=math.radians(values[LAUNCH_ELEVATION]),
+        apogee=values[LAUNCH_APOGEE],
     )
 
 

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import typed_call
-from css_common.sections import CELLS
 from css_estimation.attitude import attitude_ekf, attitude_options, attitude_solution, flight_references
 from css_estimation.attitude.flight_references import References
+from css_sensors.cells import CELLS
 
 FACES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)
 TABLE = CELLS + attitude_options.PARAMETERS + flight_references.PARAMETERS

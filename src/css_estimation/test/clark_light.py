@@ -8,8 +8,9 @@ import numpy as np
 
 from css_common.mission import load_mission
 from css_common.schema import default_values
-from css_common.sections import CELLS, SPACECRAFT
+from css_common.sections import SPACECRAFT
 from css_estimation.sun import flat_cells, pyramid_switch
+from css_sensors.cells import CELLS
 
 CONFIG = Path(__file__).parents[3] / "config"
 SHARED = CELLS + SPACECRAFT

@@ -8,7 +8,6 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.sections import CELLS
 from css_common.vectors import multiply
 from css_estimation.attitude import attitude_options, flight_references
 from css_estimation.attitude.cell_voltages import cell_measurement
@@ -18,6 +17,7 @@ from css_estimation.attitude.field_direction import biased_field_measurement, fi
 from css_estimation.attitude.lit_sun_vector import lit_sun, sun_vector_measurement
 from css_estimation.attitude.slow_errors import BRIGHTNESS, FIELD, MAGNETOMETER
 from css_estimation.sun.cell_calibration import SCALE, TILT_1, TILT_2, nominal
+from css_sensors.cells import CELLS
 
 FACES = [1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, -1.0]
 TABLE = CELLS + attitude_options.PARAMETERS + flight_references.PARAMETERS

@@ -12,13 +12,13 @@ from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.kernel import outer_kernel
-from css_common.sections import CELLS
 from css_common.vectors import angle_between
 from css_estimation.sun import least_squares as wls
 from css_estimation.sun import sun_patterns
 from css_estimation.sun.cell_layout import brightest
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_heading import NO_COVARIANCE
+from css_sensors.cells import CELLS
 
 OPEN = {"cells__clip_normal": [0.0, 0.0, 0.0]}
 R = math.sqrt(0.5)

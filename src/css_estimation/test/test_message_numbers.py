@@ -8,6 +8,7 @@ from css_estimation.attitude import attitude_solution
 from css_estimation.spin import coning, slit_passage
 from css_estimation.sun import sun_heading
 from css_msgs.msg import AttitudeEstimate, ConingEstimate, SlitPulse, SlitSunAngle, SunEstimate
+from css_sensors.slits import LOWER, UPPER, VERTICAL
 
 
 @pytest.mark.parametrize(
@@ -27,4 +28,4 @@ def test_numbers_are_those_of_the_message(module, message, count):
 
 def test_slits_are_those_of_the_pulses():
     stated = (SlitPulse.SLIT_UPPER, SlitPulse.SLIT_VERTICAL, SlitPulse.SLIT_LOWER)
-    assert stated == (slit_passage.UPPER, slit_passage.VERTICAL, slit_passage.LOWER)
+    assert stated == (UPPER, VERTICAL, LOWER)

@@ -10,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_common.schema import default_values
-from css_common.sections import SLITS
 from css_estimation.spin import slit_measurement
 from css_estimation.spin.slit_passage import (
-    LOWER,
     REASON_COUNT,
     REASON_DOUBLE,
     REASON_MISSED,
@@ -22,10 +20,9 @@ from css_estimation.spin.slit_passage import (
     REASON_TIMER,
     REASON_TURN_CHANGE,
     REASON_TURN_RANGE,
-    UPPER,
-    VERTICAL,
 )
 from css_estimation.spin.slit_record import read_record
+from css_sensors.slits import LOWER, SLITS, UPPER, VERTICAL
 
 PARAMETERS = slit_measurement.parameters(default_values((*SLITS, *slit_measurement.PARAMETERS)))
 TURN = 180_000

@@ -8,7 +8,6 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.sections import CELLS
 from css_common.vectors import angle_between, cross, multiply, norm, scale, subtract
 from css_estimation.sun import sunline_ekf, wavg
 from css_estimation.sun.sun_heading import (
@@ -20,6 +19,7 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_NONE,
     VALIDITY_VALID,
 )
+from css_sensors.cells import CELLS
 
 ESTIMATORS = pytest.mark.parametrize("estimator", [wavg, sunline_ekf], ids=["wavg", "ekf"])
 NORMALS = np.asarray(okeefe_values(CELLS).cells.normals)

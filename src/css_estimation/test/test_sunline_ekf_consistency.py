@@ -15,10 +15,10 @@ from okeefe_spacecraft import okeefe_values
 from scipy.stats import chi2
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.sections import CELLS
 from css_common.vectors import angle_between, multiply, scale
 from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sun_heading import UNAIDED
+from css_sensors.cells import CELLS
 
 RUNS = 60
 STEPS = 300

@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from css_common.sections import CELLS
 from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.symmetric import congruence, product, row_major
+from css_sensors.cells import CELLS
 
 
 @pytest.fixture

@@ -9,7 +9,6 @@ from okeefe_spacecraft import okeefe_values
 from scipy.stats import chi2
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.sections import CELLS
 from css_common.vectors import angle_between, multiply, scale
 from css_estimation.sun import sunline_suekf, sunline_ukf
 from css_estimation.sun.sun_heading import RATE_SUN, UNAIDED, VALIDITY_HELD, VALIDITY_VALID
@@ -20,6 +19,7 @@ from css_estimation.sun.unscented_cycle import (
     MODE_STARTED,
     MODE_TRACKING,
 )
+from css_sensors.cells import CELLS
 
 BOTH = pytest.mark.parametrize("algorithm", [sunline_ukf, sunline_suekf], ids=["sunline_ukf", "sunline_suekf"])
 DT = 0.1

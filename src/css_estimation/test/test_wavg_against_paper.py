@@ -13,12 +13,12 @@ from ideal_cells import AZIMUTH, POLAR, WEIGHT, direction, ideal_outputs, percen
 from okeefe_spacecraft import okeefe_values
 
 from css_common.kernel import kernel
-from css_common.sections import CELLS
 from css_common.vectors import angle_between
 from css_estimation.sun import wavg
 from css_estimation.sun.cell_layout import brightest, cell_layout
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_heading import UNAIDED
+from css_sensors.cells import CELLS
 
 
 def wavg_parameters(**changes):

@@ -12,7 +12,7 @@ from rosbags.highlevel import AnyReader
 
 from css_common.mission_file import flattened, read_sections
 from css_common.schema import checked_values
-from css_common.sections import SECTIONS
+from css_common.shared_sections import shared_parameters
 from css_recording.bag_reader import BagReader
 from css_recording.commands.import_csv import main
 from css_recording.csv_import import import_telemetry, refuse_unscaled
@@ -93,8 +93,7 @@ def test_mission_inside_holds_the_layout_and_passes_the_checks_of_missions(tmp_p
         text = reader.mission_text
         assert reader.description["python"]
     shared = flattened(read_sections(text, "recording")["/**"])
-    shared_table = tuple(parameter for section in SECTIONS.values() for parameter in section)
-    values = checked_values(shared_table, shared)
+    values = checked_values(shared_parameters().values(), shared)
     assert values["cells.normals"] == [1.0, 0.0, 0.0, 0.0, 0.6, 0.8]
     assert values["cells.field_of_view_deg"] == 100.0
     assert values["cells.clip_normal"] == [0.0, 0.0, 1.0]

@@ -18,9 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import builder, given, part, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Table, Values, choice, integer, real, texts
+from css_common.schema import Values, choice, integer, real, texts
+from css_common.sections import PERIOD
+from css_sensors.cells import NORMALS
 
 FORM = "CELL dead|stuck VALUE|noisy SIGMA [from START] [to END]"
 DEAD, STUCK, NOISY = 0, 1, 2
@@ -29,14 +32,6 @@ _LAST_STEP = 2**62
 
 # Draws of a case's failures, apart from those of noisy cells, whose index is the place of the fault.
 _FAILURES = 2**31
-
-PARAMETERS: Table = (
-    dataclasses.replace(texts("faults", (), f"failed cells, each {FORM}; times in s"), tunable=True),
-    integer("random_faults.count", 0, "-", "so many different cells, drawn for each case, fail", low=0, high=32),
-    choice("random_faults.kind", "dead", ("dead", "stuck", "mixed"), "how they fail; mixed: either, equally likely"),
-    real("random_faults.value", -1.0, "-", "output of stuck ones; below 0: uniform from 0 to 1", low=-1.0, high=10.0),
-    real("random_faults.time", 0.0, "s", "when they fail", low=0.0, high=1e9),
-)
 
 FAULT = np.dtype(
     [
@@ -86,18 +81,44 @@ def parse_fault(text: str) -> Fault:
     return Fault(cell, kind, value, start_s, end_s)
 
 
-def drawn_faults(values: Values, key: RandomKey) -> list[Fault]:
-    """Faults of `random_faults.count` different cells, each set of cells equally likely, at most one for each cell.
+class RandomFaults(NamedTuple):
+    """Failures that are drawn for each case."""
+
+    cells: int = given(
+        integer("random_faults.count", 0, "-", "so many different cells, drawn for each case, fail", low=0, high=32)
+    )
+    kind: str = given(
+        choice("random_faults.kind", "dead", ("dead", "stuck", "mixed"), "how they fail; mixed: either, equally likely")
+    )
+    value: float = given(
+        real(
+            "random_faults.value", -1.0, "-", "output of stuck ones; below 0: uniform from 0 to 1", low=-1.0, high=10.0
+        )
+    )
+    time: float = given(real("random_faults.time", 0.0, "s", "when they fail", low=0.0, high=1e9))
+
+
+class CellFaults(NamedTuple):
+    """All failures of a mission."""
+
+    faults: list[str] = given(
+        dataclasses.replace(texts("faults", (), f"failed cells, each {FORM}; times in s"), tunable=True)
+    )
+    random: RandomFaults = part(RandomFaults)
+
+
+PARAMETERS = table_of(CellFaults)
+parameters = builder(CellFaults)
+
+
+def drawn_faults(p: RandomFaults, cells: int, key: RandomKey) -> list[Fault]:
+    """Faults of `p.cells` different ones of so many cells, each set of them equally likely, at most one for each cell.
 
     A case with more failures has those of the case with fewer among them.
-
-    Args:
-        values: checked ones (`PARAMETERS` and the mission's `cells`).
     """
-    p = values.random_faults
-    healthy = list(range(len(values.cells.normals)))
+    healthy = list(range(cells))
     faults = []
-    for k in range(min(p.count, len(healthy))):
+    for k in range(min(p.cells, len(healthy))):
         which, kind, value, _ = uniform4(key, Stream.CELL_FAILURE, 0, _FAILURES + k)
         cell = healthy.pop(int(which * len(healthy)))
         if p.kind == "dead" or (p.kind == "mixed" and kind < 0.5):
@@ -118,23 +139,23 @@ def case_faults(values: Values, key: RandomKey) -> np.ndarray:
     Raises:
         ValueError: a fault's text has another form.
     """
+    p, period = parameters(values), values[PERIOD]
 
     def step(time_s: float) -> int:
         # a fault begins with the first cycle at or after its time; the slack is for times like 0.3 / 0.1
-        return _LAST_STEP if math.isinf(time_s) else math.ceil(time_s / values.mission.period - 1e-6)
+        return _LAST_STEP if math.isinf(time_s) else math.ceil(time_s / period - 1e-6)
 
-    faults = [parse_fault(text) for text in values.faults] + drawn_faults(values, key)
+    faults = [parse_fault(text) for text in p.faults] + drawn_faults(p.random, len(values[NORMALS]), key)
     rows = [(f.cell, f.kind, f.value, step(f.start_s), step(f.end_s)) for f in faults]
     return np.array(rows, dtype=FAULT)
 
 
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
-    cell_count = len(values.cells.normals)
-    failing = values.random_faults.count
-    if failing > cell_count:
-        yield f"random_faults.count: {failing} given, expected at most the number of cells, {cell_count}"
-    for text in values.faults:
+    p, cell_count = parameters(values), len(values[NORMALS])
+    if p.random.cells > cell_count:
+        yield f"random_faults.count: {p.random.cells} given, expected at most the number of cells, {cell_count}"
+    for text in p.faults:
         try:
             fault = parse_fault(text)
         except ValueError as error:

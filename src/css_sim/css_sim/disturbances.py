@@ -10,35 +10,23 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel, outer_kernel
-from css_common.schema import Table, Values, flag, real, reals
-from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, norm, scale, unit
+from css_common.schema import Values, flag, real, reals
+from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, norm, scale, unit, vector_of
 from css_environment.atmosphere import ATMOSPHERE_400_KM, ExponentialAtmosphere, air_velocity, density
 from css_environment.constants import EARTH_MU
 from css_environment.ephemeris import EnvironmentState
 
-PARAMETERS: Table = (
-    flag("disturbances.gravity_gradient", False, "torque of the Earth's gravity gradient"),
-    flag("disturbances.aerodynamic", False, "torque of drag on the panels"),
-    flag("disturbances.solar_pressure", False, "torque of sunlight on the panels"),
-    reals("disturbances.dipole", (0.0, 0.0, 0.0), "A m^2", "residual magnetic dipole of the spacecraft", length=3),
-    real("air.density", ATMOSPHERE_400_KM.reference_density, "kg/m^3", "density at air.altitude", low=0.0, high=1.0),
-    real("air.altitude", ATMOSPHERE_400_KM.reference_altitude, "m", "where air.density holds", low=0.0, high=1e7),
-    real(
-        "air.scale_height",
-        ATMOSPHERE_400_KM.scale_height,
-        "m",
-        "climb over which the density falls by 1/e",
-        low=100.0,
-        high=1e7,
-    ),
-    reals("panels.areas", (), "m^2", "area of each flat panel; a plate with two sides is two panels", low=0.0),
-    reals("panels.normals", (), "-", "outward unit normals of the panels in b, a row each", columns=3),
-    reals("panels.centres", (), "m", "centres of the panels in b from the centre of mass, a row each", columns=3),
-    real("panels.drag_coefficient", 2.2, "-", "drag coefficient of all panels", low=0.0, high=10.0),
-    real("panels.specular", 0.1, "-", "fraction of sunlight reflected like a mirror", low=0.0, high=1.0),
-    real("panels.diffuse", 0.2, "-", "fraction of sunlight scattered", low=0.0, high=1.0),
-)
+GRAVITY_GRADIENT = flag("disturbances.gravity_gradient", False, "torque of the Earth's gravity gradient")
+AERODYNAMIC = flag("disturbances.aerodynamic", False, "torque of drag on the panels")
+SOLAR_PRESSURE_ACTS = flag("disturbances.solar_pressure", False, "torque of sunlight on the panels")
+DIPOLE = reals("disturbances.dipole", (0.0, 0.0, 0.0), "A m^2", "residual magnetic dipole of the spacecraft", length=3)
+_AREAS = reals("panels.areas", (), "m^2", "area of each flat panel; a plate with two sides is two panels", low=0.0)
+_NORMALS = reals("panels.normals", (), "-", "outward unit normals of the panels in b, a row each", columns=3)
+_CENTRES = reals("panels.centres", (), "m", "centres of the panels in b from the centre of mass, a row each", columns=3)
+_SPECULAR = real("panels.specular", 0.1, "-", "fraction of sunlight reflected like a mirror", low=0.0, high=1.0)
+_DIFFUSE = real("panels.diffuse", 0.2, "-", "fraction of sunlight scattered", low=0.0, high=1.0)
 
 SOLAR_PRESSURE = 4.56e-6
 """Pressure of sunlight on a black surface at 1 AU [N/m^2] (Montenbruck & Gill, section 3.4)."""
@@ -47,56 +35,63 @@ PANEL = np.dtype([(name, np.float64) for name in ("area", "nx", "ny", "nz", "cx"
 """One panel: area [m^2], outward unit normal and centre [m] from the centre of mass, both in b."""
 
 
+def _panels(areas: np.ndarray, normals_b: np.ndarray, centres_b: np.ndarray) -> np.ndarray:
+    panels = np.zeros(len(areas), PANEL)
+    panels["area"] = areas
+    panels["nx"], panels["ny"], panels["nz"] = normals_b.T
+    panels["cx"], panels["cy"], panels["cz"] = centres_b.T
+    return panels
+
+
 class Disturbances(NamedTuple):
     """Which torques act, and on what."""
 
-    gravity_gradient: bool
-    aerodynamic: bool
-    solar_pressure: bool
-    atmosphere: ExponentialAtmosphere
-    dipole_b: Vec3  # [A m^2]
-    drag_coefficient: float
-    specular: float
-    diffuse: float
-    panels: np.ndarray  # (K,) of PANEL
-
-
-def parameters(values: Values) -> Disturbances:
-    """Parameters of `disturbance_torque` from checked values (`PARAMETERS`)."""
-    x, y, z = (float(m) for m in values.disturbances.dipole)
-    panels = np.zeros(len(values.panels.areas), PANEL)
-    panels["area"] = values.panels.areas
-    panels["nx"], panels["ny"], panels["nz"] = values.panels.normals.T
-    panels["cx"], panels["cy"], panels["cz"] = values.panels.centres.T
-    return Disturbances(
-        gravity_gradient=values.disturbances.gravity_gradient,
-        aerodynamic=values.disturbances.aerodynamic,
-        solar_pressure=values.disturbances.solar_pressure,
-        atmosphere=ExponentialAtmosphere(values.air.density, values.air.altitude, values.air.scale_height),
-        dipole_b=(x, y, z),
-        drag_coefficient=values.panels.drag_coefficient,
-        specular=values.panels.specular,
-        diffuse=values.panels.diffuse,
-        panels=panels,
+    gravity_gradient: bool = given(GRAVITY_GRADIENT)
+    aerodynamic: bool = given(AERODYNAMIC)
+    solar_pressure: bool = given(SOLAR_PRESSURE_ACTS)
+    dipole_b: Vec3 = made(vector_of, DIPOLE)  # [A m^2]
+    atmosphere: ExponentialAtmosphere = made(
+        ExponentialAtmosphere,
+        real(
+            "air.density", ATMOSPHERE_400_KM.reference_density, "kg/m^3", "density at air.altitude", low=0.0, high=1.0
+        ),
+        real("air.altitude", ATMOSPHERE_400_KM.reference_altitude, "m", "where air.density holds", low=0.0, high=1e7),
+        real(
+            "air.scale_height",
+            ATMOSPHERE_400_KM.scale_height,
+            "m",
+            "climb over which the density falls by 1/e",
+            low=100.0,
+            high=1e7,
+        ),
     )
+    panels: np.ndarray = made(_panels, _AREAS, _NORMALS, _CENTRES)  # (K,) of PANEL
+    drag_coefficient: float = given(
+        real("panels.drag_coefficient", 2.2, "-", "drag coefficient of all panels", low=0.0, high=10.0)
+    )
+    specular: float = given(_SPECULAR)
+    diffuse: float = given(_DIFFUSE)
+
+
+PARAMETERS = table_of(Disturbances)
+parameters = builder(Disturbances)
 
 
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
-    count = len(values.panels.areas)
-    for name in ("normals", "centres"):
-        rows = len(getattr(values.panels, name))
-        if rows != count:
-            yield f"panels.{name}: {rows} rows given for {count} areas, expected one each"
-    for i, length in enumerate(np.linalg.norm(values.panels.normals, axis=1)):
+    count = len(values[_AREAS])
+    for rows in (_NORMALS, _CENTRES):
+        if len(values[rows]) != count:
+            yield f"{rows.name}: {len(values[rows])} rows given for {count} areas, expected one each"
+    for i, length in enumerate(np.linalg.norm(values[_NORMALS], axis=1)):
         if abs(length - 1.0) > 1e-6:
             yield f"panels.normals: row {i} has length {length:.6g}, expected unit vectors"
-    if values.panels.specular + values.panels.diffuse > 1.0:
-        total = values.panels.specular + values.panels.diffuse
+    if values[_SPECULAR] + values[_DIFFUSE] > 1.0:
+        total = values[_SPECULAR] + values[_DIFFUSE]
         yield f"panels.specular + panels.diffuse: {total:.6g} given, expected at most 1"
-    for name in ("aerodynamic", "solar_pressure"):
-        if getattr(values.disturbances, name) and count == 0:
-            yield f"disturbances.{name}: true given without panels, expected panels.areas, normals and centres"
+    for acts in (AERODYNAMIC, SOLAR_PRESSURE_ACTS):
+        if values[acts] and count == 0:
+            yield f"{acts.name}: true given without panels, expected panels.areas, normals and centres"
 
 
 @outer_kernel
@@ -106,12 +101,12 @@ def with_dipole(p: Disturbances, dipole_b: Vec3) -> Disturbances:
         p.gravity_gradient,
         p.aerodynamic,
         p.solar_pressure,
-        p.atmosphere,
         dipole_b,
+        p.atmosphere,
+        p.panels,
         p.drag_coefficient,
         p.specular,
         p.diffuse,
-        p.panels,
     )
 
 

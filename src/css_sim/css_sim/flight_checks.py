@@ -10,11 +10,26 @@ import numpy as np
 from css_common.component import Finding
 from css_common.mission import Node
 from css_common.schema import Values
-from css_common.sections import wheel_axes
+from css_common.sections import (
+    ALTITUDE,
+    DURATION,
+    ECCENTRICITY,
+    INERTIA,
+    ORBIT_SOURCE,
+    PERIOD,
+    RODS_FITTED,
+    WHEEL_INERTIA,
+    WHEEL_MAX_SPEED,
+    WHEELS_FITTED,
+    wheel_axes,
+)
 from css_common.vectors import Vec3
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.orbit_checks import field_findings, orbit_findings
-from css_sim.initial_conditions import has_dipole
+from css_sim import initial_conditions
+from css_sim.disturbances import DIPOLE, GRAVITY_GRADIENT
+from css_sim.flight_environment import GEOMAGNETIC_FIELD
+from css_sim.initial_conditions import FIXED_RATE, MAX_RATE, RATE, WHEEL_SPEEDS, has_dipole
 
 FASTEST = 200.0
 """Body rate [rad/s] beyond which a flight ends: nothing that carries sun sensors holds together there."""
@@ -49,11 +64,11 @@ def plant_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
     """What is wrong with orbit, environment and motion of a simulated spacecraft."""
     values = node.values
     yield from orbit_findings(values)
-    if values.geomagnetic_field and _field_matters(values, graph):
+    if values[GEOMAGNETIC_FIELD] and _field_matters(values, graph):
         yield from field_findings(values)
     yield from _rate_findings(values)
     yield from _swing_findings(values)
-    if values.wheels.fitted:
+    if values[WHEELS_FITTED]:
         controlled = any(
             output.topic == "wheels/torque_command" for other in graph.values() for output in other.outputs
         )
@@ -62,29 +77,30 @@ def plant_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
 
 def _field_matters(values: Values, graph: Mapping[str, Node]) -> bool:
     measured = any(output.topic == "mag/field" for other in graph.values() for output in other.outputs)
-    return measured or values.rods.fitted or has_dipole(values)
+    return measured or values[RODS_FITTED] or has_dipole(values)
 
 
 def _first_rates(values: Values) -> tuple[str, np.ndarray]:
     """The key of the first body rate, and the largest rate about each axis [rad/s]."""
-    initial = values.initial
-    if initial.rate == "random":
-        return "initial.max_rate_deg_s", np.full(3, math.radians(initial.max_rate_deg_s))
-    if initial.rate == "direction":
-        return "initial.rate_deg_s", np.full(3, math.radians(initial.rate_deg_s))
-    return "initial.omega_deg_s", np.radians(np.abs(initial.omega_deg_s))
+    start = initial_conditions.parameters(values)
+    if start.random_rate:
+        return MAX_RATE.name, np.full(3, start.max_rate)
+    if start.random_direction:
+        return RATE.name, np.full(3, start.rate)
+    return FIXED_RATE.name, np.abs(start.omega_bn_b)
 
 
 def fastest_start(values: Values) -> float:
     """Largest norm [rad/s] of the body rate at the epoch."""
-    if values.initial.rate == "direction":
-        return math.radians(values.initial.rate_deg_s)
+    start = initial_conditions.parameters(values)
+    if start.random_direction:
+        return start.rate
     return float(np.linalg.norm(_first_rates(values)[1]))
 
 
 def _rate_findings(values: Values) -> Iterator[Finding]:
     key, _ = _first_rates(values)
-    fastest, period = fastest_start(values), values.mission.period
+    fastest, period = fastest_start(values), values[PERIOD]
     if fastest > FASTEST:
         yield Finding(
             f"{key}: up to {math.degrees(fastest):.0f} deg/s given, expected at most {math.degrees(FASTEST):.0f}",
@@ -99,19 +115,18 @@ def _rate_findings(values: Values) -> Iterator[Finding]:
 
 def _swing_findings(values: Values) -> Iterator[Finding]:
     """Torques held over a cycle h pump the swing that they make: it grows by (its angular frequency)^2 h/4 a second."""
-    smallest, _, largest = np.linalg.eigvalsh(values.spacecraft.inertia)
-    orbit = values.orbit
-    perigee = (
-        (EARTH_RADIUS + orbit.altitude) * (1.0 - orbit.eccentricity) if orbit.source == "elements" else EARTH_RADIUS
-    )
+    smallest, _, largest = np.linalg.eigvalsh(values[INERTIA])
+    perigee = EARTH_RADIUS
+    if values[ORBIT_SOURCE] == "elements":
+        perigee = (EARTH_RADIUS + values[ALTITUDE]) * (1.0 - values[ECCENTRICITY])
     field = _FIELD_AT_GROUND * (EARTH_RADIUS / perigee) ** 3
-    gravity = values.disturbances.gravity_gradient
-    dipole = np.abs(values.disturbances.dipole) + values.dispersion.dipole
+    gravity = values[GRAVITY_GRADIENT]
+    dipole = np.abs(values[DIPOLE]) + initial_conditions.dispersion(values).dipole
     squares = {
         "disturbances.dipole": float(np.linalg.norm(dipole)) * field / smallest,
         "disturbances.gravity_gradient": 3.0 * EARTH_MU / perigee**3 * (largest - smallest) / smallest * gravity,
     }
-    period, duration = values.mission.period, values.mission.duration
+    period, duration = values[PERIOD], values[DURATION]
     for key, square in squares.items():
         growth = 0.25 * square * period * duration
         if growth > _PUMPED:
@@ -123,7 +138,7 @@ def _swing_findings(values: Values) -> Iterator[Finding]:
 
 
 def _wheel_findings(values: Values, controlled: bool) -> Iterator[Finding]:
-    limit, given = values.wheels.max_speed_rpm, values.initial.wheel_speed_rpm
+    limit, given = values[WHEEL_MAX_SPEED], values[WHEEL_SPEEDS]
     first = float(np.max(np.abs(given), initial=0.0))
     needed = first + _needed_speed_rpm(values)
     if first >= _NEARLY_FULL * limit:
@@ -141,6 +156,6 @@ def _wheel_findings(values: Values, controlled: bool) -> Iterator[Finding]:
 def _needed_speed_rpm(values: Values) -> float:
     """Largest speed of a wheel when all have taken up the body's first momentum, over the signs of its rates."""
     _, rates = _first_rates(values)
-    share = np.linalg.pinv(wheel_axes(values).T) @ values.spacecraft.inertia
+    share = np.linalg.pinv(wheel_axes(values).T) @ values[INERTIA]
     momenta = [np.max(np.abs(share @ (rates * signs))) for signs in itertools.product((1.0, -1.0), repeat=3)]
-    return float(max(momenta)) / values.wheels.inertia / _RADIANS_PER_RPM
+    return float(max(momenta)) / values[WHEEL_INERTIA] / _RADIANS_PER_RPM

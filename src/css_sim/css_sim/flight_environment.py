@@ -4,13 +4,13 @@
 from css_common.schema import Table, Values, choice, flag
 from css_environment.mission_environment import MissionEnvironment
 
-PARAMETERS: Table = (
-    choice("shadow", "conical", ("conical", "cylindrical"), "shape of the Earth's shadow"),
-    flag("geomagnetic_field", True, "compute the field; without it the truth's field is zero"),
-)
+_SHADOW = choice("shadow", "conical", ("conical", "cylindrical"), "shape of the Earth's shadow")
+GEOMAGNETIC_FIELD = flag("geomagnetic_field", True, "compute the field; without it the truth's field is zero")
+
+PARAMETERS: Table = (_SHADOW, GEOMAGNETIC_FIELD)
 
 
 def flight_environment(values: Values, field: bool = True) -> MissionEnvironment:
     """The environment that `PARAMETERS` and the mission's orbit describe; `field=False` when nobody needs the field."""
-    field = field and values.geomagnetic_field
-    return MissionEnvironment(values, field=field, conical_shadow=values.shadow == "conical")
+    field = field and values[GEOMAGNETIC_FIELD]
+    return MissionEnvironment(values, field=field, conical_shadow=values[_SHADOW] == "conical")

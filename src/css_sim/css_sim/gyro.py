@@ -18,6 +18,8 @@ from css_sim.three_axes import draw_bias, read_out, reading_variance, with_noise
 
 _RADIANS_PER_SECOND = math.pi / 180.0 / 3600.0
 
+NOISE = real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3)
+
 
 def _per_second(rate_deg_h: float) -> float:
     return rate_deg_h * _RADIANS_PER_SECOND
@@ -29,9 +31,7 @@ class Gyro(NamedTuple):
     bias: float = made(
         _per_second, real("bias_deg_h", 1.0, "deg/h", "1 sigma of the constant bias, per axis", low=0.0, high=1e6)
     )
-    noise: float = made(
-        math.radians, real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3)
-    )
+    noise: float = made(math.radians, NOISE)
     bias_walk: float = made(
         math.radians,
         real("bias_walk_deg_s", 0.0, "deg/s", "1 sigma of the change of bias from step to step", low=0.0, high=1.0),

@@ -11,27 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.attitude import mrp_shadow, quaternion_to_mrp
-from css_common.declared import builder, made, table_of
+from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Values, choice, real, reals
-from css_common.sections import wheel_axes
+from css_common.sections import INERTIA, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, wheel_axes
 from css_common.vectors import Vec3, vector_of
+from css_sim.disturbances import DIPOLE
 from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momentum_at_speed
-
-_DISPERSION = (
-    reals("initial.wheel_speed_rpm", (), "rpm", "wheel speeds relative to the body; empty: at rest"),
-    real("dispersion.inertia", 0.0, "-", "1 sigma of each principal moment, relative", low=0.0, high=0.2),
-    real(
-        "dispersion.dipole",
-        0.0,
-        "A m^2",
-        "1 sigma of the residual dipole about its mean, per axis",
-        low=0.0,
-        high=100.0,
-    ),
-    real("dispersion.wheel_torque", 0.0, "-", "1 sigma of each wheel's torque limit, relative", low=0.0, high=0.5),
-)
 
 _RADIANS_PER_RPM = 2.0 * math.pi / 60.0
 
@@ -41,12 +28,16 @@ def _rates(omega_deg_s: np.ndarray) -> Vec3:
     return w1, w2, w3
 
 
-_RATE = choice(
+RATE_KIND = choice(
     "initial.rate",
     "random",
     ("random", "direction", "fixed"),
     "uniform per axis, initial.rate_deg_s in a random direction, or initial.omega_deg_s",
 )
+
+MAX_RATE = real("initial.max_rate_deg_s", 2.0, "deg/s", "bound of the random rate, per axis", low=0.0, high=3600.0)
+RATE = real("initial.rate_deg_s", 2.0, "deg/s", "body rate in a random direction", low=0.0, high=3600.0)
+FIXED_RATE = reals("initial.omega_deg_s", (0.0, 0.0, 0.0), "deg/s", "fixed body rate", length=3)
 
 
 class InitialConditions(NamedTuple):
@@ -60,33 +51,49 @@ class InitialConditions(NamedTuple):
         vector_of,
         reals("initial.sigma_bn", (0.0, 0.0, 0.0), "-", "MRP of the fixed attitude, b relative to n", length=3),
     )
-    random_rate: bool = made(lambda word: word == "random", _RATE)
-    max_rate: float = made(  # [rad/s]
-        math.radians,
-        real("initial.max_rate_deg_s", 2.0, "deg/s", "bound of the random rate, per axis", low=0.0, high=3600.0),
+    random_rate: bool = made(lambda word: word == "random", RATE_KIND)
+    max_rate: float = made(math.radians, MAX_RATE)  # [rad/s]
+    random_direction: bool = made(lambda word: word == "direction", RATE_KIND)
+    rate: float = made(math.radians, RATE)  # [rad/s]
+    omega_bn_b: Vec3 = made(_rates, FIXED_RATE)  # [rad/s]
+
+
+class Dispersion(NamedTuple):
+    """How far mass properties and limits of a case are from those of the mission."""
+
+    inertia: float = given(
+        real("dispersion.inertia", 0.0, "-", "1 sigma of each principal moment, relative", low=0.0, high=0.2)
     )
-    random_direction: bool = made(lambda word: word == "direction", _RATE)
-    rate: float = made(  # [rad/s]
-        math.radians,
-        real("initial.rate_deg_s", 2.0, "deg/s", "body rate in a random direction", low=0.0, high=3600.0),
+    dipole: float = given(  # [A m^2]
+        real(
+            "dispersion.dipole",
+            0.0,
+            "A m^2",
+            "1 sigma of the residual dipole about its mean, per axis",
+            low=0.0,
+            high=100.0,
+        )
     )
-    omega_bn_b: Vec3 = made(  # [rad/s]
-        _rates, reals("initial.omega_deg_s", (0.0, 0.0, 0.0), "deg/s", "fixed body rate", length=3)
+    wheel_torque: float = given(
+        real("dispersion.wheel_torque", 0.0, "-", "1 sigma of each wheel's torque limit, relative", low=0.0, high=0.5)
     )
 
 
-PARAMETERS = (*table_of(InitialConditions), *_DISPERSION)
+WHEEL_SPEEDS = reals("initial.wheel_speed_rpm", (), "rpm", "wheel speeds relative to the body; empty: at rest")
+
+PARAMETERS = (*table_of(InitialConditions), WHEEL_SPEEDS, *table_of(Dispersion))
 parameters = builder(InitialConditions)
+dispersion = builder(Dispersion)
 
 
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
-    given, wheels = len(values.initial.wheel_speed_rpm), len(wheel_axes(values))
-    if given not in ((0, 1, wheels) if wheels else (0,)):
+    speeds, wheels = values[WHEEL_SPEEDS], len(wheel_axes(values))
+    if len(speeds) not in ((0, 1, wheels) if wheels else (0,)):
         expected = f"none, 1 or {wheels}" if wheels else "none without wheels"
-        yield f"initial.wheel_speed_rpm: {given} values given, expected {expected}"
-    fastest = np.max(np.abs(values.initial.wheel_speed_rpm), initial=0.0)
-    if fastest > values.wheels.max_speed_rpm:
+        yield f"initial.wheel_speed_rpm: {len(speeds)} values given, expected {expected}"
+    fastest = np.max(np.abs(speeds), initial=0.0)
+    if fastest > values[WHEEL_MAX_SPEED]:
         yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"
 
 
@@ -141,8 +148,8 @@ def initial_wheel_momentum(body: RigidBody, omega_bn_b: Vec3, wheel_speed_rpm) -
 
 def dispersed_dipole(values: Values, key: RandomKey) -> Vec3:
     """Residual dipole of one case in b [A m^2]: `disturbances.dipole`, dispersed."""
-    x, y, z = (float(m) for m in values.disturbances.dipole)
-    sigma = float(values.dispersion.dipole)
+    x, y, z = vector_of(values[DIPOLE])
+    sigma = dispersion(values).dipole
     if sigma == 0.0:
         return (x, y, z)
     n = normal4(key, Stream.DIPOLE, 0, 0)
@@ -151,7 +158,7 @@ def dispersed_dipole(values: Values, key: RandomKey) -> Vec3:
 
 def has_dipole(values: Values) -> bool:
     """Whether the spacecraft of some case has a residual dipole."""
-    return bool(np.any(values.disturbances.dipole)) or values.dispersion.dipole > 0.0
+    return bool(np.any(values[DIPOLE])) or dispersion(values).dipole > 0.0
 
 
 def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBody:
@@ -160,17 +167,17 @@ def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBo
     Principal moments are scaled, axes stay; scaled moments that no rigid body has (triangle inequality) are
     brought back to the nearest that one has.
     """
-    inertia = np.asarray(values.spacecraft.inertia, dtype=np.float64)
-    axes = wheel_axes(values)
-    torque = np.full(len(axes), values.wheels.max_torque)
-    if values.dispersion.inertia > 0.0:
+    spread = dispersion(values)
+    inertia, axes = values[INERTIA], wheel_axes(values)
+    torque = np.full(len(axes), values[WHEEL_MAX_TORQUE])
+    if spread.inertia > 0.0:
         moments, principal = np.linalg.eigh(inertia)
         draws = np.array(normal4(key, Stream.INERTIA, 0, 0)[:3])
-        moments = moments * np.clip(1.0 + values.dispersion.inertia * draws, 0.1, None)
+        moments = moments * np.clip(1.0 + spread.inertia * draws, 0.1, None)
         largest = int(np.argmax(moments))
         moments[largest] = min(moments[largest], np.sum(np.delete(moments, largest)))
         inertia = (principal * moments) @ principal.T
-    if values.dispersion.wheel_torque > 0.0:
+    if spread.wheel_torque > 0.0:
         draws = np.array([normal4(key, Stream.WHEEL_LIMIT, 0, i)[0] for i in range(len(torque))])
-        torque = torque * np.clip(1.0 + values.dispersion.wheel_torque * draws, 0.0, None)
-    return rigid_body(inertia, axes, values.wheels.inertia, torque, values.wheels.max_speed_rpm, substeps)
+        torque = torque * np.clip(1.0 + spread.wheel_torque * draws, 0.0, None)
+    return rigid_body(inertia, axes, values[WHEEL_INERTIA], torque, values[WHEEL_MAX_SPEED], substeps)

@@ -12,14 +12,14 @@ from css_common.vectors import Vec3, add
 from css_sim import three_axes
 from css_sim.three_axes import read_out, reading_variance, with_noise
 
+NOISE = real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6)
+
 
 class Magnetometer(NamedTuple):
     """Statistics and limits [T]."""
 
     bias: float = made(tesla, real("bias_nt", 0.0, "nT", "1 sigma of the constant bias, per axis", low=0.0, high=1e6))
-    noise: float = made(
-        tesla, real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6)
-    )
+    noise: float = made(tesla, NOISE)
     resolution: float = made(
         tesla, real("resolution_nt", 0.0, "nT", "step of its output; 0: continuous", low=0.0, high=1e6)
     )

@@ -15,12 +15,9 @@ import numpy as np
 from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, multiply
+from css_sensors.slits import FIELD_OF_VIEW, SLITS_PER_HEAD, head_azimuths, slit_inclination
 from css_sim.spinning_payload import PayloadMotion, payload_state
 
-UPPER, VERTICAL, LOWER = 0, 1, 2
-"""Slits of a head, as in css_msgs/SlitPulse."""
-
-SLITS_PER_HEAD = 3
 _LARGEST_TURN = 0.2  # [rad] between two looks: no slit is crossed twice in it, unless the Sun leaves the view there
 _RESOLUTION = 1e-13  # [s]
 
@@ -36,12 +33,12 @@ class SlitGeometry(NamedTuple):
 
 def slit_geometry(values: Values) -> SlitGeometry:
     """The heads of a mission (section slits)."""
-    azimuths = np.radians(values.slits.head_azimuths_deg)
+    azimuths = np.asarray(head_azimuths(values))
     return SlitGeometry(
         np.cos(azimuths),
         np.sin(azimuths),
-        math.tan(math.radians(values.slits.inclination_deg)),
-        math.sin(math.radians(0.5 * values.slits.field_of_view_deg)),
+        math.tan(slit_inclination(values)),
+        math.sin(math.radians(0.5 * values[FIELD_OF_VIEW])),
     )
 
 

@@ -8,20 +8,14 @@ from css_common.conversions import seconds
 from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Values, real
-
-WRAP = 2**32
-"""Counts after which the 32-bit timer begins anew."""
-
-
-def _frequency(values: Values) -> float:
-    return float(values.slits.counter_hz)
+from css_common.schema import real
+from css_sensors.slits import timer_frequency
 
 
 class SlitTimer(NamedTuple):
     """Frequency and errors; times in seconds."""
 
-    frequency: float = computed(_frequency)  # [Hz]
+    frequency: float = computed(timer_frequency)  # [Hz]
     jitter: float = made(seconds, real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4))
     missed: float = given(real("missed", 0.0, "-", "probability that a crossing gives no pulse", low=0.0, high=1.0))
     double: float = given(

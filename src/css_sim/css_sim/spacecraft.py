@@ -9,6 +9,7 @@ from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
+from css_common.sections import ROD_AXES, ROD_MAX_DIPOLE, RODS_FITTED
 from css_common.vectors import Vec3, add, cross, multiply
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances
@@ -29,15 +30,14 @@ class Spacecraft(NamedTuple):
 
 def spacecraft(values: Values, key: RandomKey, substeps: int = 1) -> Spacecraft:
     """The spacecraft of one case, with its drawn mass properties and dipole (sections spacecraft, wheels and rods)."""
-    environment = disturbances.parameters(values)._replace(dipole_b=dispersed_dipole(values, key))
-    options = values.disturbances
-    axes = values.rods.axes if values.rods.fitted else np.zeros((0, 3))
+    torques = disturbances.parameters(values)
+    axes = values[ROD_AXES] if values[RODS_FITTED] else np.zeros((0, 3))
     return Spacecraft(
         body=dispersed_body(values, key, substeps),
-        disturbances=environment,
+        disturbances=torques._replace(dipole_b=dispersed_dipole(values, key)),
         rod_axes_b=np.ascontiguousarray(axes, dtype=np.float64),
-        rod_max_dipole=values.rods.max_dipole,
-        disturbed=options.gravity_gradient or options.aerodynamic or options.solar_pressure or has_dipole(values),
+        rod_max_dipole=values[ROD_MAX_DIPOLE],
+        disturbed=torques.gravity_gradient or torques.aerodynamic or torques.solar_pressure or has_dipole(values),
     )
 
 

@@ -20,6 +20,18 @@ from css_common.schema import Values
 from css_common.vectors import Mat3, Vec3, matmul, transpose
 from css_environment.ballistic import local_direction_n
 from css_environment.mission_environment import mission_launch
+from css_sensors.payload import (
+    AXIS_AZIMUTH,
+    AXIS_ELEVATION,
+    CONING_ANGLE,
+    CONING_PERIOD,
+    FINAL_CONING_PERIOD,
+    FLAT_SPIN_ANGLE,
+    FLAT_SPIN_RATE,
+    FLAT_SPIN_START,
+    PHASE_STARTS,
+    SPIN,
+)
 
 _FULL_TURN = 2.0 * math.pi
 
@@ -107,26 +119,25 @@ def inertia_ratio(spin_hz: float, coning_period: float, half_angle: float) -> fl
 
 def payload_motion(values: Values, epoch_ns: int, key: RandomKey) -> PayloadMotion:
     """Motion of one case (sections payload and orbit), from a roll and a coning phase that are drawn for it."""
-    p = values.payload
     first_roll, first_phase = (_FULL_TURN * u for u in uniform4(key, Stream.SPIN_PHASE, 0, 0)[:2])
-    starts = [*p.phase_starts.tolist()]
-    ends = [*starts[1:], p.flat_spin_start]
+    starts = values[PHASE_STARTS].tolist()
+    ends = [*starts[1:], values[FLAT_SPIN_START]]
     phases: list[tuple] = []
     dcm_hn = _momentum_frame(values, epoch_ns)
     psi, phi = first_roll, first_phase
     fastest = 0.0
     for i, (start, end) in enumerate(zip(starts, ends, strict=True)):
-        theta = 0.5 * math.radians(p.coning_angle_deg[i])
+        theta = 0.5 * math.radians(values[CONING_ANGLE][i])
         if i > 0:
             # the body stays as it is; its h turns to the new angle, in the plane of the old h and the axis
             dcm_bn = _state_of(phases, start).dcm_bn
             dcm_hn = np.asarray(matmul(transpose(euler_313_dcm(0.0, theta, psi)), dcm_bn))
             phi = 0.0
-        rate = _FULL_TURN / p.coning_period[i]
+        rate = _FULL_TURN / values[CONING_PERIOD][i]
         acceleration = 0.0
-        if i == len(starts) - 1 and p.final_coning_period > 0.0:
-            acceleration = (_FULL_TURN / p.final_coning_period - rate) / (end - start)
-        turn_rate = _FULL_TURN * p.spin_hz[i]
+        if i == len(starts) - 1 and values[FINAL_CONING_PERIOD] > 0.0:
+            acceleration = (_FULL_TURN / values[FINAL_CONING_PERIOD] - rate) / (end - start)
+        turn_rate = _FULL_TURN * values[SPIN][i]
         spin_rate = turn_rate - rate
         phases.append((start, (phi, rate, acceleration), (theta, 0.0, theta), (psi, spin_rate), dcm_hn))
         t = end - start
@@ -134,17 +145,23 @@ def payload_motion(values: Values, epoch_ns: int, key: RandomKey) -> PayloadMoti
         phi += (rate + 0.5 * acceleration * t) * t
         fastest = max(fastest, abs(turn_rate) + 2.0 * rate)
     final_rate = rate + acceleration * t
-    opening = math.radians(p.flat_spin_rate_deg_s)
-    largest = math.radians(p.flat_spin_angle_deg)
+    opening = math.radians(values[FLAT_SPIN_RATE])
+    largest = math.radians(values[FLAT_SPIN_ANGLE])
     phases.append(
-        (p.flat_spin_start, (phi, final_rate, 0.0), (theta, opening, largest), (psi, turn_rate - final_rate), dcm_hn)
+        (
+            values[FLAT_SPIN_START],
+            (phi, final_rate, 0.0),
+            (theta, opening, largest),
+            (psi, turn_rate - final_rate),
+            dcm_hn,
+        )
     )
     return _motion(phases, fastest + opening)
 
 
 def _momentum_frame(values: Values, epoch_ns: int) -> np.ndarray:
     """Rows of a frame along the angular momentum at the epoch, in n."""
-    azimuth, elevation = math.radians(values.payload.axis_azimuth_deg), math.radians(values.payload.axis_elevation_deg)
+    azimuth, elevation = math.radians(values[AXIS_AZIMUTH]), math.radians(values[AXIS_ELEVATION])
     launch = mission_launch(values)
     z = local_direction_n(launch, epoch_ns, azimuth, elevation)
     x = local_direction_n(launch, epoch_ns, azimuth, elevation - 0.5 * math.pi)

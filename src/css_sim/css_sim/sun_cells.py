@@ -22,15 +22,16 @@ from typing import NamedTuple
 from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
-from css_common.schema import Values, choice, flag, integer, real
+from css_common.schema import choice, flag, integer, real
 from css_common.vectors import Vec3
 from css_environment.albedo import Screen, transmission
+from css_sensors.cells import half_view_cosine
 from css_sim import cell_screen
 from css_sim.cell_faults import apply_faults
 
-
-def _cos_half_view(values: Values) -> float:
-    return math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
+NOISE = real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0)
+OUTPUT_LOW = real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0)
+OUTPUT_HIGH = real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0)
 
 
 def _levels(bits: int) -> float:
@@ -41,7 +42,7 @@ class SunCells(NamedTuple):
     """What all cells have in common in all cases; what differs is in `cell_errors.CELL` and `cell_faults.FAULT`."""
 
     screen: Screen = computed(cell_screen.screen)  # what hides part of the sky
-    cos_half_view: float = computed(_cos_half_view)
+    cos_half_view: float = computed(half_view_cosine)
     warp: bool = given(flag("warp", True, "flattened response of O'Keefe & Schaub 2013, Eq. 16"))
     degradation: float = given(
         real("degradation", 0.05, "-", "largest loss of output, drawn anew every step", low=0.0, high=1.0)
@@ -50,10 +51,10 @@ class SunCells(NamedTuple):
         lambda word: word == "per_cell",
         choice("degradation_mode", "common", ("common", "per_cell"), "one draw for all cells, or one for each"),
     )
-    noise: float = given(real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0))
+    noise: float = given(NOISE)
     dropout: float = given(real("dropout", 0.0, "-", "light below this level gives no output", low=0.0, high=1.0))
-    output_low: float = given(real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0))
-    output_high: float = given(real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0))
+    output_low: float = given(OUTPUT_LOW)
+    output_high: float = given(OUTPUT_HIGH)
     levels: float = made(  # steps between lowest and highest output; 0: continuous
         _levels,
         integer("bits", 0, "-", "resolution between lowest and highest output; 0: continuous", low=0, high=32),

@@ -12,8 +12,10 @@ from scipy import stats
 
 from css_common.random_streams import Stream, random_key
 from css_common.schema import default_values
-from css_common.sections import CELLS, MISSION, SLITS, SPACECRAFT, WHEELS
+from css_common.sections import MISSION, SPACECRAFT, WHEELS
 from css_environment.reflectivity import Reflectivity, draw_reflectivity
+from css_sensors.cells import CELLS
+from css_sensors.slits import SLITS
 from css_sim import (
     cell_errors,
     cell_faults,

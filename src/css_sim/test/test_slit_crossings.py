@@ -13,7 +13,8 @@ from spinning import FLIGHT, STEADY, motion_of, payload_values, sun_over_andoya
 
 from css_common.random_streams import random_key
 from css_msgs.msg import SlitPulse
-from css_sim.slit_crossings import LOWER, UPPER, VERTICAL, slit_crossings, slit_geometry
+from css_sensors.slits import LOWER, UPPER, VERTICAL
+from css_sim.slit_crossings import slit_crossings, slit_geometry
 from css_sim.slit_timer import SlitTimer, read_pulses
 from css_sim.spinning_payload import payload_state
 

@@ -15,8 +15,9 @@ from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import mrp_to_dcm
 from css_common.random_streams import random_key
-from css_common.sections import CELLS, MISSION
+from css_common.sections import MISSION
 from css_common.vectors import multiply
+from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "coarse_sun_sensor.json").read_text())

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from okeefe_spacecraft import okeefe_values
 
 from css_common.random_streams import random_key
-from css_common.sections import CELLS, MISSION
+from css_common.sections import MISSION
+from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
 
 fraction = st.floats(0.0, 1.0)

@@ -9,7 +9,7 @@ from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.random_streams import random_key
-from css_common.sections import CELLS
+from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_screen, sun_cells
 from css_sim.cell_faults import NO_FAULTS
 

@@ -14,11 +14,12 @@ from css_analysis.readable_table import ReadableTable
 from css_analysis.slit_file import read_slit_file
 from css_common.command import FAILED, complain
 from css_common.schema import ParameterError, Values, default_values
-from css_common.sections import SLITS, conflicts
+from css_common.shared_sections import conflicts
 from css_estimation.spin import slit_measurement
 from css_estimation.spin.coning import Coning, analyse_coning, justification
 from css_estimation.spin.slit_passage import REASONS
 from css_estimation.spin.slit_record import SlitRecord, read_record
+from css_sensors.slits import SLITS, head_azimuths, slit_inclination
 
 
 def run(prog: str, options: argparse.Namespace) -> int:
@@ -60,14 +61,14 @@ def _values(options: argparse.Namespace) -> Values:
 
 
 def _record(options: argparse.Namespace, values: Values) -> SlitRecord:
-    azimuths = np.radians(values.slits.head_azimuths_deg).tolist()
+    azimuths = head_azimuths(values)
     return read_record(slit_measurement.parameters(values), read_slit_file(options.file, len(azimuths)), azimuths)
 
 
 def _windows(options: argparse.Namespace, values: Values, record: SlitRecord) -> dict[str, Coning | None]:
     time = record.passages.time
     spans = [_span(text) for text in options.window] or [(float(time[0]), math.nextafter(float(time[-1]), math.inf))]
-    inclination = math.radians(values.slits.inclination_deg)
+    inclination = slit_inclination(values)
     return {
         f"{start:.2f} to {end:.2f} s": analyse_coning(
             record.passages.between(start, end), inclination, options.inertia_ratio

@@ -16,6 +16,7 @@ from css_estimation.spin.coning import Passages, analyse_coning
 from css_estimation.spin.coning_spectrum import MOST_CANDIDATES
 from css_estimation.spin.slit_measurement import INERTIA_RATIO
 from css_msgs.msg import ConingEstimate, SlitSunAngle
+from css_sensors.slits import counts_between, head_azimuths, slit_inclination, timer_frequency
 
 _COLUMNS = len(Passages._fields)
 _LEGS = reals(
@@ -50,8 +51,8 @@ class Coning(Component):
         self._due = math.inf
         self._fields: dict[str, Any] | None = None
         self._window = (0.0, 0.0)
-        self._inclination = math.radians(self.values.slits.inclination_deg)
-        self._azimuths = np.radians(self.values.slits.head_azimuths_deg).tolist()
+        self._inclination = slit_inclination(self.values)
+        self._azimuths = head_azimuths(self.values)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         angle = received["angle"]
@@ -78,8 +79,8 @@ class Coning(Component):
             return
         if not self._rows:
             self._due = now + self.values[_INTERVAL]
-        frequency = self.values.slits.counter_hz
-        upper = _signed(angle.upper - angle.vertical) / frequency
+        frequency = timer_frequency(self.values)
+        upper = counts_between(angle.upper, angle.vertical) / frequency
         self._rows.append(
             (time, angle.sun_angle, angle.rate, upper, upper + angle.count / frequency, self._azimuths[angle.head])
         )
@@ -140,11 +141,6 @@ def _padded(values: Iterable[float]) -> np.ndarray:
     given = list(values)
     padded[: len(given)] = given
     return padded
-
-
-def _signed(difference: int) -> int:
-    """Difference of two counts of 32 bits that are less than half a wrap apart."""
-    return (difference + 2**31) % 2**32 - 2**31
 
 
 main = node_main(Coning)

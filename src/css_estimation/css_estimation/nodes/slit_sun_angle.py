@@ -18,6 +18,7 @@ from css_estimation.spin.slit_passage import HIGHEST_SPIN, LOWEST_SPIN, REASON_N
 from css_estimation.spin.slit_timer_counts import UnwrappedTimer
 from css_estimation.symmetric import row_major
 from css_msgs.msg import SlitPulses, SlitSunAngle
+from css_sensors.slits import TIMER_SPAN, UPPER, head_azimuths
 
 
 class SlitPassages(Component):
@@ -50,7 +51,7 @@ class SlitPassages(Component):
 
     def configure(self) -> None:
         self._p = slit_measurement.parameters(self.values)
-        self._azimuths = np.radians(self.values.slits.head_azimuths_deg).tolist()
+        self._azimuths = head_azimuths(self.values)
         self._heads = [slit_passage.initial_state() for _ in self._azimuths]
         self._swing = slit_measurement.initial_swing(self._p)
         self._timer = UnwrappedTimer()
@@ -59,7 +60,7 @@ class SlitPassages(Component):
         self._refused = 0
         self._take, self._measure = typed_call(slit_passage.take_pulse), typed_call(slit_measurement.measure)
         # compiled here, not at the first passage: the loop would wait
-        self._take(self._p.passage, self._heads[0], slit_passage.UPPER, 0)
+        self._take(self._p.passage, self._heads[0], UPPER, 0)
         self._measure(self._p, self._swing, Passage(True, REASON_NONE, 0, 1, 0, 0), 0.0)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
@@ -110,8 +111,8 @@ class SlitPassages(Component):
             "age": max(0.0, (timer - passage.vertical - HALF_COUNT) / self._p.frequency),
             "count": passage.interval,
             "turn": passage.turn,
-            "upper": passage.upper % 2**32,
-            "vertical": passage.vertical % 2**32,
+            "upper": passage.upper % TIMER_SPAN,
+            "vertical": passage.vertical % TIMER_SPAN,
             "head": head,
             **common,
         }

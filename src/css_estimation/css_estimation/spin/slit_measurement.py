@@ -12,6 +12,7 @@ from css_common.vectors import Vec3
 from css_estimation.spin import slit_angles
 from css_estimation.spin.slit_passage import Passage, PassageParameters
 from css_estimation.symmetric import Symmetric
+from css_sensors.slits import slit_inclination, timer_frequency
 
 INERTIA_RATIO = real(
     "inertia_ratio", 0.0, "-", "axial over transverse moment of inertia; 0: unknown", low=0.0, high=2.0
@@ -25,24 +26,16 @@ _WEIGHT = 0.03
 _PRIOR_SAMPLES = 3
 
 
-def _frequency(values: Values) -> float:
-    return float(values.slits.counter_hz)
-
-
-def _inclination(values: Values) -> float:
-    return math.radians(values.slits.inclination_deg)
-
-
 def _jitter(values: Values) -> float:
-    return 1e-6 * values[_JITTER] * _frequency(values)
+    return 1e-6 * values[_JITTER] * timer_frequency(values)
 
 
 class SlitParameters(NamedTuple):
     """All of the measurement, with the mission's `slits`."""
 
     passage: PassageParameters = part(PassageParameters)
-    frequency: float = computed(_frequency)  # [Hz]
-    inclination: float = computed(_inclination)  # [rad]
+    frequency: float = computed(timer_frequency)  # [Hz]
+    inclination: float = computed(slit_inclination)  # [rad]
     inertia_ratio: float = given(INERTIA_RATIO)
     jitter: float = computed(_jitter, _JITTER)  # [counts]
     prior_variance: float = made(  # [rad^2]

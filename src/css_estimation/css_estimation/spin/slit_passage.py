@@ -11,6 +11,7 @@ from typing import NamedTuple
 from css_common.declared import computed, given
 from css_common.kernel import kernel
 from css_common.schema import Parameter, Values, integer, real
+from css_sensors.slits import LOWER, UPPER, VERTICAL, timer_frequency
 
 LOWEST_SPIN = real(
     "lowest_spin_hz", 0.2, "Hz", "slowest spin: a longer time between upper pulses is no turn", low=0.001
@@ -18,9 +19,6 @@ LOWEST_SPIN = real(
 HIGHEST_SPIN = real(
     "highest_spin_hz", 20.0, "Hz", "fastest spin: a shorter time between upper pulses is no turn", low=0.002
 )
-
-UPPER, VERTICAL, LOWER = 0, 1, 2
-"""Slits, as in css_msgs/SlitPulse."""
 
 # The numbers of css_msgs/SlitSunAngle.
 REASON_NONE = 0
@@ -57,7 +55,7 @@ _DISORDER = 0.02
 
 def _turn_of(spin: Parameter[float]) -> Callable[[Values], int]:
     """Length [counts] of a turn at a spin."""
-    return lambda values: int(values.slits.counter_hz / values[spin])
+    return lambda values: int(timer_frequency(values) / values[spin])
 
 
 class PassageParameters(NamedTuple):

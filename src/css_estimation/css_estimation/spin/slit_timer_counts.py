@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Counts of a timer of 32 bits as counts of one that never begins anew."""
 
-SPAN = 2**32
-"""Counts after which the timer begins anew."""
-
-_HALF = 2**31
+from css_sensors.slits import counts_between
 
 
 class UnwrappedTimer:
@@ -18,5 +15,5 @@ class UnwrappedTimer:
         if self._last is None:
             self._last = count
         else:
-            self._last += (count - self._last + _HALF) % SPAN - _HALF
+            self._last += counts_between(count, self._last)
         return self._last

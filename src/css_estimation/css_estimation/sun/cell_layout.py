@@ -8,8 +8,9 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.schema import Values
-from css_common.vectors import Vec3
+from css_common.vectors import Vec3, vector_of
 from css_estimation.symmetric import Symmetric, product
+from css_sensors.cells import IN_PLANE, half_view_cosine, plane_sides
 
 READABLE = 2.0
 """From it on a number is no reading of a cell, 1 being the Sun at normal incidence.
@@ -17,10 +18,6 @@ READABLE = 2.0
 No place gives a cell more than 2/sqrt(3) = 1.155 of the Sun's flux, 1.034 of the normal one at most: that is Sun and
 white, diffuse Earth that fills the other half of the sky together, at the best angles of both. The rest is for cells
 that are not calibrated."""
-
-# A normal this close to the clipping plane lies in it: rounding must not hide half of such a cell's view.
-_IN_PLANE = 1e-9
-
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side")], align=True)
 """One cell: outward unit normal in b, and its component along the clip normal; 0: the cell is not clipped."""
@@ -37,14 +34,10 @@ class CellLayout(NamedTuple):
 def cell_layout(values: Values) -> CellLayout:
     """Layout of the mission's `cells` section."""
     normals_b = np.asarray(values.cells.normals, dtype=np.float64)
-    clip_normal_b = np.asarray(values.cells.clip_normal, dtype=np.float64)
     cells = np.zeros(len(normals_b), CELL)
     cells["nx"], cells["ny"], cells["nz"] = normals_b.T
-    cells["side"] = normals_b @ clip_normal_b
-    cells["side"][np.abs(cells["side"]) < _IN_PLANE] = 0.0
-    x, y, z = (float(c) for c in clip_normal_b)
-    cos_half_view = math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
-    return CellLayout(cells, (x, y, z), cos_half_view)
+    cells["side"] = plane_sides(values)
+    return CellLayout(cells, vector_of(values.cells.clip_normal), half_view_cosine(values))
 
 
 @kernel
@@ -69,7 +62,7 @@ def share_view(layout: CellLayout, i: int, mask: int) -> bool:
     cell = layout.cells[i]
     half = max(layout.cos_half_view, 0.0)
     # cosine of the whole view: normals further apart have cones without a common direction
-    apart = 2.0 * half * half - 1.0 + _IN_PLANE
+    apart = 2.0 * half * half - 1.0 + IN_PLANE
     for j in range(layout.cells.shape[0]):
         if mask >> j & 1:
             other = layout.cells[j]
@@ -107,7 +100,7 @@ def is_opposed(layout: CellLayout, i: int, mask: int) -> bool:
     cell = layout.cells[i]
     for j in range(layout.cells.shape[0]):
         other = layout.cells[j]
-        if mask >> j & 1 and cell.nx * other.nx + cell.ny * other.ny + cell.nz * other.nz < -_IN_PLANE:
+        if mask >> j & 1 and cell.nx * other.nx + cell.ny * other.ny + cell.nz * other.nz < -IN_PLANE:
             return True
     return False
 

@@ -18,6 +18,7 @@ from css_common.declared import computed, given, made
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, flag, real
 from css_estimation.sun.cell_layout import READABLE, CellLayout, share_view
+from css_sensors.cells import half_view_cosine
 
 CELL_SIGMA = real(
     "cell_sigma", 0.1, "-", "cell error, all causes, 1 sigma", low=0.0, open_low=True, high=10.0, tunable=True
@@ -38,7 +39,7 @@ DIM_CELLS = flag(
 
 def dimmest_output(values: Values) -> float:
     """Output at the edge of view, as a share of the brightest; infinite where no cell below a gate sees the Sun."""
-    edge = _AT_THE_EDGE * max(0.0, math.cos(math.radians(0.5 * values.cells.field_of_view_deg)))
+    edge = _AT_THE_EDGE * max(0.0, half_view_cosine(values))
     # rounding must not make a view of 120 deg a wider one
     return edge if values[DIM_CELLS] and edge < _ENDS_AT - 1e-9 else math.inf
 

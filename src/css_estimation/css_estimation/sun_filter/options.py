@@ -15,6 +15,7 @@ from css_environment.albedo import Screen, plane_screen
 from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import EclipseParameters
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
+from css_sensors.cells import half_view_cosine, plane_sides
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
 """One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
@@ -23,7 +24,6 @@ output in the dark [-]."""
 WHEEL = np.dtype([(name, np.float64) for name in ("hx", "hy", "hz")], align=True)
 """One reaction wheel: spin axis times spin inertia [kg m2]."""
 
-_IN_PLANE = 1e-9
 _NO_NORMAL = 1e-9
 _FEWEST = 2  # points of a table
 
@@ -43,13 +43,11 @@ USE_WHEELS = flag("use_wheels", True, "without gyro, take the rate from angular 
 def _cells(values: Values) -> np.ndarray:
     """(N,) of CELL."""
     nominal = np.asarray(values.cells.normals, dtype=np.float64).reshape(-1, 3)
-    clip_normal = np.asarray(values.cells.clip_normal, dtype=np.float64)
     cells = np.zeros(len(nominal), CELL)
     measured = np.asarray(values[NORMALS], dtype=np.float64).reshape(-1, 3) if len(values[NORMALS]) else nominal
     cells["nx"], cells["ny"], cells["nz"] = (measured / np.linalg.norm(measured, axis=1, keepdims=True)).T
     # what hides the sky is structure: it follows the layout, not a cell's tilt
-    cells["side"] = nominal @ clip_normal
-    cells["side"][np.abs(cells["side"]) < _IN_PLANE] = 0.0
+    cells["side"] = plane_sides(values)
     cells["gain"] = values[GAINS] if len(values[GAINS]) else 1.0
     cells["dark"] = values[DARKS] if len(values[DARKS]) else 0.0
     return cells
@@ -57,10 +55,6 @@ def _cells(values: Values) -> np.ndarray:
 
 def _screen(values: Values) -> Screen:
     return plane_screen(values.cells.clip_normal)
-
-
-def _cos_half_view(values: Values) -> float:
-    return math.cos(math.radians(0.5 * values.cells.field_of_view_deg))
 
 
 def _table(values: Values) -> np.ndarray:
@@ -163,7 +157,18 @@ class EarthErrors(NamedTuple):
     clouds: float = given(
         real("albedo.cloud_sigma", 0.3, "-", "error of the light on a single cell, 1 sigma of it", low=0.0, high=10.0)
     )
-    clouds_time: float = given(real("albedo.cloud_time", 100.0, "s", "correlation time of it", low=1.0, high=1e9))
+    clouds_time: float = given(real("albedo.cloud_time", 70.0, "s", "correlation time of it", low=1.0, high=1e9))
+    clouds_angle: float = made(  # [rad]
+        math.radians,
+        real(
+            "albedo.cloud_angle_deg",
+            50.0,
+            "deg",
+            "turn of the body after which a cell looks at other clouds",
+            low=1.0,
+            high=1e6,
+        ),
+    )
     unknown: float = given(
         real("albedo.unknown", 0.1, "-", "light of an Earth that is not predicted, on one cell", low=0.0, high=1.0)
     )
@@ -277,7 +282,7 @@ class SunFilterParameters(NamedTuple):
 
     cells: np.ndarray = computed(_cells, GAINS, DARKS, NORMALS)
     screen: Screen = computed(_screen)
-    cos_half_view: float = computed(_cos_half_view)
+    cos_half_view: float = computed(half_view_cosine)
     response: Response = part(Response)
     errors: CellErrors = part(CellErrors)
     earth: EarthErrors = part(EarthErrors)

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The flights behind the page: the mission as it stands, with a drift, and with more heads."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +11,7 @@ from css_common.mission import Mission
 from css_common.random_streams import random_key
 from css_estimation.spin.coning import Coning, Passages, analyse_coning
 from css_papers.esprit.spinning import fly_spinning
+from css_sensors.slits import slit_inclination
 from css_sim.spinning_payload import payload_motion, payload_state
 
 MISSION = "esprit_2006"
@@ -44,7 +44,7 @@ def legs_of(flight: SpinFlight) -> Legs:
         ValueError: a leg has too few passages.
     """
     node = flight.mission.node("coning").values
-    inclination = math.radians(node.slits.inclination_deg)
+    inclination = slit_inclination(node)
     results = []
     for start, end in node.legs[:2].tolist():
         coning = analyse_coning(flight.passages.between(start, end), inclination, node.inertia_ratio)
@@ -77,7 +77,7 @@ def head_studies(mission: Mission) -> dict[str, Coning]:
             [f"slits.head_azimuths_deg={azimuths}", f"mission.duration={_HEAD_SECONDS}", "coning.legs=0,1000"]
         )
         passages = fly_spinning(flown).passages
-        coning = analyse_coning(_steady(passages, mission), math.radians(mission.values.slits.inclination_deg))
+        coning = analyse_coning(_steady(passages, mission), slit_inclination(mission.values))
         if coning is not None:
             results[name] = coning
     return results

@@ -14,7 +14,8 @@ from css_estimation.spin.coning_angle import max_min_angle
 from css_estimation.spin.slit_angles import motion_gain, quantum, sun_angle
 from css_papers.esprit.flights import AttitudeErrors, Legs
 from css_papers.rows import Must, Row, row
-from css_sim.slit_crossings import LOWER, UPPER, slit_crossings, slit_geometry
+from css_sensors.slits import LOWER, UPPER, slit_inclination
+from css_sim.slit_crossings import slit_crossings, slit_geometry
 from css_sim.spinning_payload import payload_motion, payload_state
 
 FULL_ANGLE, UP_PERIOD, DOWN_PERIOD = 12.89, 0.2618, 0.2595
@@ -153,7 +154,7 @@ def fixed_axis_row(mission: Mission) -> Row:
     steady = mission.with_overrides(["payload.coning_angle_deg=0,0,0,0"]).node("slit_sensor").values
     motion = payload_motion(steady, mission.epoch_ns, random_key(mission.values.mission.seed, 0))
     geometry, frequency = slit_geometry(sensor), sensor.slits.counter_hz
-    inclination = math.radians(sensor.slits.inclination_deg)
+    inclination = slit_inclination(sensor)
     start = float(sensor.payload.phase_starts[-1]) + 1.0
     axes = np.array(payload_state(motion, start).dcm_bn)
     room = 64

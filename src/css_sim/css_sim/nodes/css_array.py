@@ -12,6 +12,7 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import CASE, SEED
 from css_common.vectors import Mat3, multiply, vector_of
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS, earth_light_sources
@@ -19,9 +20,11 @@ from css_environment.earth_light import new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
 from css_msgs.msg import CssVoltages, SpacecraftState
+from css_sensors.cells import LARGEST_READING, NORMALS, SMALLEST_READING
 from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, sun_cells
 from css_sim.sensing import CellsOfCase, sense_cells
 from css_sim.sensor_checks import LOUDEST_CELL, noise_findings
+from css_sim.sun_cells import NOISE, OUTPUT_HIGH, OUTPUT_LOW
 
 
 class CssArray(Component):
@@ -54,30 +57,31 @@ class CssArray(Component):
         yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
         yield from earth_reflectivity.conflicts(values)
-        if values.output_low >= values.output_high:
-            yield f"output_low: {values.output_low:g} given, expected less than output_high"
+        if values[OUTPUT_LOW] >= values[OUTPUT_HIGH]:
+            yield f"output_low: {values[OUTPUT_LOW]:g} given, expected less than output_high"
         # estimators would take for missing what these cells put out
-        if values.output_low < values.cells.smallest_reading:
-            yield f"output_low: {values.output_low:g} given, expected at least cells.smallest_reading"
-        if values.output_high > values.cells.largest_reading:
-            yield f"output_high: {values.output_high:g} given, expected at most cells.largest_reading"
+        if values[OUTPUT_LOW] < values[SMALLEST_READING]:
+            yield f"output_low: {values[OUTPUT_LOW]:g} given, expected at least cells.smallest_reading"
+        if values[OUTPUT_HIGH] > values[LARGEST_READING]:
+            yield f"output_high: {values[OUTPUT_HIGH]:g} given, expected at most cells.largest_reading"
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
-        return noise_findings("noise", node.values.noise, LOUDEST_CELL, "")
+        return noise_findings(NOISE, node.values, LOUDEST_CELL)
 
     def configure(self) -> None:
         values = self.values
-        self._key = random_key(values.mission.seed, values.mission.case)
+        self._key = random_key(values[SEED], values[CASE])
         self._p = sun_cells.parameters(values)
-        nominal = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
+        nominal = cell_errors.nominal_cells(values[NORMALS], cell_screen.cell_sides(values))
         cells = nominal.copy()
         cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, cells)
         faults = cell_faults.case_faults(values, self._key)
         self._cells = CellsOfCase(cells, faults, np.zeros(len(cells)), new_workspace())
         grid = earth_reflectivity.source(values, self.epoch_ns)
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
-        self._albedo_model = MODELS[values.albedo.model]
+        light = earth_reflectivity.parameters(values)
+        self._earthlit, self._albedo_model = light.enabled, MODELS[light.model]
         self._view, self._light = new_earth_view(), new_light()
         self._segment_s = -1.0
         self._to_dcm, self._turn = typed_call(mrp_to_dcm), typed_call(multiply)
@@ -93,7 +97,7 @@ class CssArray(Component):
         truth = received["truth"]
         dcm_bn = self._to_dcm(vector_of(truth.sigma_bn))
         sun_n = vector_of(truth.sun_n)
-        if self.values.albedo.enabled:
+        if self._earthlit:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
             self._sources(
                 self._albedo_model,
@@ -114,7 +118,7 @@ class CssArray(Component):
             dcm_bn,
             self._turn(dcm_bn, sun_n),
             truth.solar_flux * truth.illumination,
-            self.values.albedo.enabled,
+            self._earthlit,
             self._light,
             voltages,
         )

@@ -13,11 +13,17 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
+from css_common.sections import CASE, DURATION, PERIOD, ROD_AXES, RODS_FITTED, SEED, WHEEL_AXES, WHEELS_FITTED
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
 from css_sim import disturbances, flight_environment, initial_conditions
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
+
+_SUBSTEPS = integer(
+    "substeps", 1, "-", "least integration steps per control cycle; fast motion has more", low=1, high=1000
+)
+_POSE = flag("publish_pose", False, "also publish the body's pose, for displays")
 
 
 class Dynamics(Plant):
@@ -28,10 +34,8 @@ class Dynamics(Plant):
         *initial_conditions.PARAMETERS,
         *flight_environment.PARAMETERS,
         *disturbances.PARAMETERS,
-        integer(
-            "substeps", 1, "-", "least integration steps per control cycle; fast motion has more", low=1, high=1000
-        ),
-        flag("publish_pose", False, "also publish the body's pose, for displays"),
+        _SUBSTEPS,
+        _POSE,
     )
 
     @classmethod
@@ -41,7 +45,7 @@ class Dynamics(Plant):
             "wheels/torque_command",
             WheelTorqueCommand,
             required=False,  # a mission may fly without control
-            lengths={"torque": len(values.wheels.axes)},
+            lengths={"torque": len(values[WHEEL_AXES])},
             used=("torque",),
         )
         rods = Input(
@@ -49,24 +53,24 @@ class Dynamics(Plant):
             "rods/dipole_command",
             RodDipoleCommand,
             required=False,
-            lengths={"dipole": len(values.rods.axes)},
+            lengths={"dipole": len(values[ROD_AXES])},
             used=("dipole",),
         )
-        fitted = ((wheels, values.wheels.fitted), (rods, values.rods.fitted))
+        fitted = ((wheels, values[WHEELS_FITTED]), (rods, values[RODS_FITTED]))
         return tuple(actuator for actuator, is_there in fitted if is_there)
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
         outputs = [Output("truth", "truth", SpacecraftState, frame=INERTIAL)]
-        if values.wheels.fitted:
+        if values[WHEELS_FITTED]:
             outputs.append(Output("wheels", "wheels/state", WheelState))
-        if values.publish_pose:
+        if values[_POSE]:
             outputs.append(Output("pose", "truth/pose", PoseStamped, frame=INERTIAL))
         return tuple(outputs)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        wheels = ("wheels.axes",) if values.wheels.fitted else ()
+        wheels = ("wheels.axes",) if values[WHEELS_FITTED] else ()
         return ("orbit.source", "spacecraft.inertia", *wheels)
 
     @classmethod
@@ -84,18 +88,18 @@ class Dynamics(Plant):
 
     def configure(self) -> None:
         values = self.values
-        key = random_key(values.mission.seed, values.mission.case)
-        self._craft = spacecraft(values, key, values.substeps)
+        key = random_key(values[SEED], values[CASE])
+        self._craft = spacecraft(values, key, values[_SUBSTEPS])
         self._environment = flight_environment.flight_environment(values)
         self._state = initial_conditions.initial_state(initial_conditions.parameters(values), key)
         self._momentum = initial_conditions.initial_wheel_momentum(
-            self._craft.body, self._state.omega_bn_b, values.initial.wheel_speed_rpm
+            self._craft.body, self._state.omega_bn_b, values[initial_conditions.WHEEL_SPEEDS]
         )
         self._wheels_at_rest = np.zeros(len(self._momentum))
         self._rods_at_rest = np.zeros(len(self._craft.rod_axes_b))
         self._torque = np.zeros(len(self._momentum))
         self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
-        self._steps = round(values.mission.duration / values.mission.period)
+        self._steps = round(values[DURATION] / values[PERIOD])
         self.finished = False
 
     def begin(self) -> Outgoing:
@@ -136,7 +140,7 @@ class Dynamics(Plant):
                 illumination=surroundings.illumination,
             ),
         }
-        if self.values.wheels.fitted:
+        if self.values[WHEELS_FITTED]:
             speed = np.zeros(len(self._momentum))
             self._wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
             messages["wheels"] = self.message(
@@ -147,7 +151,7 @@ class Dynamics(Plant):
                 torque_limited=torque_limited,
                 torque=self._torque.copy(),
             )
-        if self.values.publish_pose:
+        if self.values[_POSE]:
             # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
             # dcm_bn in the convention of css_common.attitude
             pose = np.array((*surroundings.r_n, *mrp_to_quaternion(state.sigma_bn)))

@@ -12,6 +12,7 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import CASE, SEED
 from css_msgs.msg import SpacecraftState
 from css_sim import gyro
 from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
@@ -37,10 +38,10 @@ class Gyro(Component):
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
-        return noise_findings("noise_deg_s", node.values.noise_deg_s, LOUDEST_GYRO_DEG_S, "deg/s")
+        return noise_findings(gyro.NOISE, node.values, LOUDEST_GYRO_DEG_S)
 
     def configure(self) -> None:
-        self._key = random_key(self.values.mission.seed, self.values.mission.case)
+        self._key = random_key(self.values[SEED], self.values[CASE])
         self._p = gyro.parameters(self.values)
         self._errors = gyro.draw_errors(self._p, self._key)
         self._measure = typed_call(gyro.measure)

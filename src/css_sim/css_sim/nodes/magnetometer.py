@@ -12,6 +12,7 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import CASE, FIELD_DIVIDER, SEED
 from css_msgs.msg import SpacecraftState
 from css_sim import magnetometer
 from css_sim.sensing import sense_field
@@ -35,14 +36,14 @@ class Magnetometer(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("field", "mag/field", MagneticField, divider=values.magnetometer.divider),)
+        return (Output("field", "mag/field", MagneticField, divider=values[FIELD_DIVIDER]),)
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
-        return noise_findings("noise_nt", node.values.noise_nt, LOUDEST_FIELD_NT, "nT")
+        return noise_findings(magnetometer.NOISE, node.values, LOUDEST_FIELD_NT)
 
     def configure(self) -> None:
-        self._key = random_key(self.values.mission.seed, self.values.mission.case)
+        self._key = random_key(self.values[SEED], self.values[CASE])
         self._p = magnetometer.parameters(self.values)
         self._bias_b = magnetometer.draw_bias(self._p, self._key)
         self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
@@ -61,7 +62,7 @@ class Magnetometer(Component):
         return self._field(stamp_ns, np.zeros(3), _NOTHING) if self._is_due(self.step_of(stamp_ns)) else {}
 
     def _is_due(self, step: int) -> bool:
-        return step % self.values.magnetometer.divider == 0
+        return step % self.values[FIELD_DIVIDER] == 0
 
     def _field(self, stamp_ns: int, field_b: np.ndarray, covariance: np.ndarray) -> Outgoing:
         return {"field": self.message("field", stamp_ns, magnetic_field=field_b, magnetic_field_covariance=covariance)}

@@ -12,9 +12,11 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import CASE, DURATION, PERIOD, SEED
 from css_environment.orbit_checks import field_findings, orbit_findings
 from css_msgs.msg import SpacecraftState
 from css_sim import flight_environment
+from css_sim.flight_environment import GEOMAGNETIC_FIELD
 from css_sim.spinning_payload import payload_motion, payload_state
 
 
@@ -35,15 +37,15 @@ class Rocket(Plant):
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         yield from orbit_findings(node.values)
-        if node.values.geomagnetic_field:
+        if node.values[GEOMAGNETIC_FIELD]:
             yield from field_findings(node.values)
 
     def configure(self) -> None:
         values = self.values
-        self._motion = payload_motion(values, self.epoch_ns, random_key(values.mission.seed, values.mission.case))
+        self._motion = payload_motion(values, self.epoch_ns, random_key(values[SEED], values[CASE]))
         self._environment = flight_environment.flight_environment(values)
         self._state, self._to_mrp = typed_call(payload_state), typed_call(dcm_to_mrp)
-        self._steps = round(values.mission.duration / values.mission.period)
+        self._steps = round(values[DURATION] / values[PERIOD])
         self.finished = False
 
     def begin(self) -> Outgoing:

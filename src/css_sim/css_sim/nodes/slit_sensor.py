@@ -12,11 +12,12 @@ from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import CASE, PERIOD, SEED
 from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import SlitPulse, SlitPulses, SpacecraftState
+from css_sensors.slits import HEAD_AZIMUTHS, SLITS_PER_HEAD, TIMER_SPAN
 from css_sim import slit_timer
-from css_sim.slit_crossings import SLITS_PER_HEAD, slit_crossings, slit_geometry
-from css_sim.slit_timer import WRAP
+from css_sim.slit_crossings import slit_crossings, slit_geometry
 from css_sim.spinning_payload import payload_motion, payload_state
 
 _SUNLIT = 0.5
@@ -48,12 +49,12 @@ class SlitSensor(Component):
 
     def configure(self) -> None:
         values = self.values
-        self._key = random_key(values.mission.seed, values.mission.case)
+        self._key = random_key(values[SEED], values[CASE])
         self._timer = slit_timer.parameters(values)
         self._motion = payload_motion(values, self.epoch_ns, self._key)
         self._geometry = slit_geometry(values)
-        turns = self._motion.fastest * values.mission.period / (2.0 * np.pi)
-        room = int(np.ceil(turns + 1.0)) * SLITS_PER_HEAD * len(values.slits.head_azimuths_deg)
+        turns = self._motion.fastest * values[PERIOD] / (2.0 * np.pi)
+        room = int(np.ceil(turns + 1.0)) * SLITS_PER_HEAD * len(values[HEAD_AZIMUTHS])
         self._times = np.zeros(room)
         self._slits, self._heads = np.zeros(room, dtype=np.int64), np.zeros(room, dtype=np.int64)
         self._ticks, self._codes = np.zeros(2 * room, dtype=np.int64), np.zeros((2 * room, 2), dtype=np.int64)
@@ -99,12 +100,12 @@ class SlitSensor(Component):
 
     def _messages(self, stamp_ns: int, ticks: np.ndarray, codes: np.ndarray) -> Outgoing:
         # a millionth of a count, so that rounding does not cut a count that ends at the stamp
-        timer = int((stamp_ns - self.epoch_ns) * self._timer.frequency * 1e-9 + 1e-6) % WRAP
+        timer = int((stamp_ns - self.epoch_ns) * self._timer.frequency * 1e-9 + 1e-6) % TIMER_SPAN
         step = self.message(
             "step",
             stamp_ns,
             timer=timer,
-            count=(ticks % WRAP).astype(np.uint32),
+            count=(ticks % TIMER_SPAN).astype(np.uint32),
             slit=codes[:, 0].astype(np.uint32),
             head=codes[:, 1].astype(np.uint32),
         )
@@ -113,7 +114,7 @@ class SlitSensor(Component):
     def _pulses(self, ticks: np.ndarray, codes: np.ndarray) -> Iterator[Sample]:
         for count, (slit, head) in zip(ticks.tolist(), codes.tolist(), strict=True):
             instant = self.epoch_ns + round(count * 1e9 / self._timer.frequency)
-            yield self.message("pulse", instant, count=count % WRAP, slit=slit, head=head)
+            yield self.message("pulse", instant, count=count % TIMER_SPAN, slit=slit, head=head)
 
 
 main = node_main(SlitSensor)
