@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from css_common.codec import Sample
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
 from css_common.shared_sections import conflicts, section_table
@@ -128,7 +128,7 @@ class Component:
         self.values = values
         self.report: Callable[[str], object] = _unheard
         self.period_ns = round(values.mission.period * 1e9)
-        self.epoch_ns = parse_utc(values.mission.epoch)
+        self.epoch_ns = mission_epoch(values.mission)
         self.frames = {
             output.key: values.io.body_frame if output.frame == BODY else values.io.inertial_frame
             for output in self.outputs(name, values)

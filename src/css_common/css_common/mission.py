@@ -16,7 +16,7 @@ from typing import Any
 
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
@@ -143,7 +143,7 @@ class Mission:
     @property
     def epoch_ns(self) -> int:
         """Stamp of step 0 [ns since 1970 UTC]."""
-        return parse_utc(self.values.mission.epoch)
+        return mission_epoch(self.values.mission)
 
     @property
     def steps(self) -> int:

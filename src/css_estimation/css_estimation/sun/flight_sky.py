@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sun, shadow and light of the Earth as the flight's own orbit model has them, for estimators of the Sun.
+"""Sun, shadow, light and field of the Earth as the flight's own orbit model has them, for estimators of the Sun.
 
 The Earth is the filter's own: a mean reflectivity without the clouds of the day.
 """
@@ -7,13 +7,17 @@ The Earth is the filter's own: a mean reflectivity without the clouds of the day
 from typing import NamedTuple
 
 from css_common.declared import given, part, table_of
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.schema import Values, flag
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.mean_earth import MeanEarth, PredictedLight
 from css_estimation.sun.sun_heading import PREDICTION_ECLIPSED, PREDICTION_SUNLIT, UNKNOWN_SKY, Sky
 
 USE_ORBIT = flag("use_orbit", True, "use the place in orbit, where the mission has one: shadow and light of the Earth")
+
+USE_FIELD = flag(
+    "use_field", False, "take the measured magnetic field for a direction, where the place in orbit is known"
+)
 
 # Half of the solar disc: the middle of the penumbra.
 _HALF = 0.5
@@ -36,14 +40,15 @@ class FlightSky:
         has_light: the light of the Earth is predicted.
     """
 
-    def __init__(self, values: Values, with_light: bool) -> None:
+    def __init__(self, values: Values, with_light: bool, with_field: bool = False) -> None:
         """Takes sections mission and orbit.
 
         Args:
             with_light: predict the light of the Earth, by the parameters of `MeanEarth`.
+            with_field: predict its magnetic field.
         """
-        self._environment = MissionEnvironment(values, field=False)
-        self._epoch_ns = parse_utc(values.mission.epoch)
+        self._environment = MissionEnvironment(values, field=with_field)
+        self._epoch_ns = mission_epoch(values.mission)
         self.has_light = with_light
         self._predicted = PredictedLight(values) if with_light else None
         self._light = UNKNOWN_SKY.light if self._predicted is None else self._predicted.light
@@ -54,7 +59,7 @@ class FlightSky:
         if self._predicted is not None and e.illumination > 0.0:
             self._predicted.at(e)
         predicted = PREDICTION_ECLIPSED if e.illumination < _HALF else PREDICTION_SUNLIT
-        return Sky(True, predicted, e.sun_n, e.solar_flux, e.illumination, self._light)
+        return Sky(True, predicted, e.sun_n, e.solar_flux, e.illumination, e.r_n, e.field_n, self._light)
 
 
 def flight_sky(values: Values) -> FlightSky | None:
@@ -62,7 +67,7 @@ def flight_sky(values: Values) -> FlightSky | None:
     uses_light = hasattr(values, "use_orbit") and values[USE_ORBIT] and values.orbit.source != "none"
     if not uses_light and values.eclipse.source == "sensors":
         return None
-    return FlightSky(values, uses_light)
+    return FlightSky(values, uses_light, uses_light and hasattr(values, "use_field") and values[USE_FIELD])
 
 
 def sky_at(sky: FlightSky | None, stamp_ns: int) -> Sky:
