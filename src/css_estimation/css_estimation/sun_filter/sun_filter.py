@@ -344,7 +344,8 @@ def _track(
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
-    # while turns are looked for outputs are not as expected; a model of the orbit may be late by as much as a place errs
+    # while turns are looked for outputs are not as expected; a model of the orbit may be late by as much as a place
+    # errs
     settled = not earth_known or the_only_one(memory) == best
     if not use:
         # light that comes back has to be whole again
