@@ -25,12 +25,24 @@ FLIGHT = {
     "payload__coning_angle_deg": [0.8, 12.4, 12.89, 12.89],
     "payload__flat_spin_start": 357.0,
 }
+ANDOYA = {
+    "orbit__launch__latitude_deg": 69.29,
+    "orbit__launch__longitude_deg": 16.02,
+    "orbit__launch__azimuth_deg": 330.0,
+    "orbit__launch__elevation_deg": 80.0,
+    "orbit__launch__apogee": 169e3,
+    "payload__axis_azimuth_deg": 330.0,
+    "payload__axis_elevation_deg": 80.0,
+    "payload__spin_hz": [5.45],
+    "payload__coning_period": [0.2618],
+    "payload__coning_angle_deg": [12.89],
+}
 STEADY = {"payload__spin_hz": [5.45], "payload__flat_spin_start": 1e5}
 
 
 def payload_values(**changes) -> Values:
     """Sections of a mission with a spinning payload on a ballistic arc."""
-    given = {"orbit__source": "ballistic", "mission__epoch": EPOCH, **changes}
+    given = {"orbit__source": "ballistic", "mission__epoch": EPOCH, **ANDOYA, **changes}
     return default_values((*MISSION, *ORBIT, *PAYLOAD, *SLITS), **given)
 
 

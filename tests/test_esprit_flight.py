@@ -20,7 +20,15 @@ SENSORS_ALONE = """
 /**:
   ros__parameters:
     mission: {epoch: "2006-07-01T06:39:00Z", duration: 0.5, period: 0.01}
-    orbit: {source: ballistic}
+    orbit:
+      source: ballistic
+      launch: {latitude_deg: 69.29, longitude_deg: 16.02, azimuth_deg: 330.0, elevation_deg: 80.0, apogee: 169.0e+3}
+    payload:
+      axis_azimuth_deg: 330.0
+      axis_elevation_deg: 80.0
+      spin_hz: [5.45]
+      coning_period: [0.2618]
+      coning_angle_deg: [12.89]
     graph: {nodes: [css_sim/rocket, css_sim/slit_sensor, css_sim/magnetometer]}
 """
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from css_common.codec import Sample
-from css_common.epochs import parse_utc
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
+from css_common.sections import DURATION, EPOCH, epoch_of
 from css_common.shared_sections import conflicts, section_table
 
 if TYPE_CHECKING:
@@ -122,13 +122,14 @@ class Component:
     shared: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[Table] = ()
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
+    _needed_by_host: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
         self.values = values
         self.report: Callable[[str], object] = _unheard
         self.period_ns = round(values.mission.period * 1e9)
-        self.epoch_ns = parse_utc(values.mission.epoch)
+        self.epoch_ns = epoch_of(values)
         self.frames = {
             output.key: values.io.body_frame if output.frame == BODY else values.io.inertial_frame
             for output in self.outputs(name, values)
@@ -208,6 +209,7 @@ class Plant(Component):
 
     finished: bool = False
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io", "lockstep")
+    _needed_by_host: ClassVar[tuple[str, ...]] = (EPOCH.name, DURATION.name)
 
     @classmethod
     def fastest_start(cls, values: Values) -> float:
@@ -228,7 +230,8 @@ class Plant(Component):
 
 def missing_values(component_type: type[Component], values: Values) -> Iterator[str]:
     """What a component needs and has not been given, one message each."""
-    return missing(component_type.table(), values, component_type.needed(values))
+    needed = dict.fromkeys((*component_type.needed(values), *component_type._needed_by_host))
+    return missing(component_type.table(), values, needed)
 
 
 def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:

@@ -15,6 +15,7 @@ from css_common.schema import ParameterError
 TEXT = """\
 /**:
   ros__parameters:
+    mission: {epoch: '2013-06-01T00:00:00Z', duration: 10.0}
     graph: {nodes: [testbed/source, testbed/estimator]}
 estimator:
   ros__parameters: {use_gyro: false, gain: 2.0, labels: [a, b]}

@@ -164,7 +164,14 @@ def test_section_of_this_node_in_another_namespace_is_remarked(write):
     assert mission.node_of(ESTIMATOR, "estimator").values.gain == 1.0
 
 
-MISSION = section("/**", **{"graph.nodes": "[testbed/source, testbed/estimator]"})
+MISSION = section(
+    "/**",
+    **{
+        "mission.duration": 1.0,
+        "mission.epoch": "2013-06-01T00:00:00Z",
+        "graph.nodes": "[testbed/source, testbed/estimator]",
+    },
+)
 
 
 def test_mission_may_hold_sections_of_nodes_that_are_none_of_its_graph(write):

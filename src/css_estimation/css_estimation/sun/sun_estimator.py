@@ -9,11 +9,11 @@ import numpy as np
 from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
 from css_common.kernel import typed_call
 from css_common.schema import Values
+from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
-from css_estimation.sun.eclipse_detector import SOURCE
 from css_estimation.sun.field_rate import USE_FIELD
-from css_estimation.sun.flight_sky import flight_sky, sky_at
+from css_estimation.sun.flight_sky import asks_for_sky, flight_sky, sky_at
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
@@ -76,7 +76,9 @@ class SunEstimator(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("cells.normals",) if values[SOURCE] == "sensors" else ("cells.normals", "orbit.source")
+        orbit = needed_of_orbit(values) if asks_for_sky(values) else ()
+        wheels = needed_of_wheel_momentum(values) if "wheels" in cls.shared else ()
+        return ("cells.normals", *orbit, *wheels)
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
