@@ -16,6 +16,8 @@ NODES = sorted(
     (file.parts[-3], file.stem) for file in ROOT.glob("src/*/*/nodes/[a-z]*.py") if not file.stem.startswith("_")
 )
 
+SLOW = {"numba", "scipy", "rclpy", "matplotlib", "pyarrow", "rosbags", "mcap"}
+
 
 def _executable(package: str, executable: str) -> Path:
     path = Path(get_package_prefix(package)) / "lib" / package / executable
@@ -44,6 +46,18 @@ def test_verb_explains_itself_under_the_name_that_was_typed(verb):
     codes = [line.split()[0] for line in lines[lines.index("exit codes:") + 1 :]]
     assert codes == sorted(codes, key=int) and {"0", "2", "130"} <= set(codes) <= {"0", "1", "2", "130"}
     assert max(map(len, lines)) <= 120
+
+
+@pytest.mark.parametrize("verb", sorted(name for name, verb in VERBS.items() if verb.package))
+def test_verb_loads_nothing_that_takes_long_before_its_options_are_read(verb):
+    entry = VERBS[verb]
+    done = subprocess.run(
+        [_executable(entry.package, entry.executable), "--help"],
+        capture_output=True, text=True, timeout=100, check=True, env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"},
+    )  # fmt: skip
+    loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines()}
+    assert "argparse" in loaded
+    assert loaded.isdisjoint(SLOW)
 
 
 @pytest.mark.parametrize(("verb", "executable"), [("record", "recorder"), ("import-csv", "import_csv")])

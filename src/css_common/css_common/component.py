@@ -158,6 +158,11 @@ class Component:
         return ()
 
     @classmethod
+    def asked_for(cls, values: Values) -> Iterable[str]:
+        """Names of all parameters without a default that it or its host cannot do without."""
+        return dict.fromkeys((*cls.needed(values), *cls._needed_by_host))
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         """What is wrong between parameters, one message each."""
         return ()
@@ -230,8 +235,7 @@ class Plant(Component):
 
 def missing_values(component_type: type[Component], values: Values) -> Iterator[str]:
     """What a component needs and has not been given, one message each."""
-    needed = dict.fromkeys((*component_type.needed(values), *component_type._needed_by_host))
-    return missing(component_type.table(), values, needed)
+    return missing(component_type.table(), values, component_type.asked_for(values))
 
 
 def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:
