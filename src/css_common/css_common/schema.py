@@ -297,6 +297,15 @@ class Values(SimpleNamespace):
         value: T = attrgetter(parameter.name)(self)
         return value
 
+    def __contains__(self, parameter: Parameter[Any]) -> bool:
+        """Whether it is in the table."""
+        at: Any = self
+        for name in parameter.name.split("."):
+            if not hasattr(at, name):
+                return False
+            at = getattr(at, name)
+        return True
+
     def items(self, prefix: str = "") -> Iterator[tuple[str, Any]]:
         """Dotted names and values."""
         for key, value in vars(self).items():

@@ -66,11 +66,11 @@ def flight_sky(values: Values) -> FlightSky | None:
 
 def asks_for_sky(values: Values) -> bool:
     """Whether a Sun estimator's values ask for a model of where the spacecraft is."""
-    return values[SOURCE] != "sensors" or _uses_light(values)
+    return (SOURCE in values and values[SOURCE] != "sensors") or _uses_light(values)
 
 
 def _uses_light(values: Values) -> bool:
-    return hasattr(values, "use_orbit") and values[USE_ORBIT] and values[ORBIT_SOURCE] != "none"
+    return USE_ORBIT in values and values[USE_ORBIT] and values[ORBIT_SOURCE] != "none"
 
 
 def sky_at(sky: FlightSky | None, stamp_ns: int) -> Sky:
