@@ -60,6 +60,9 @@ _CONVERGED = 0.3
 # Corrections longer than this [rad] are cut.
 _LONGEST = 0.5
 _LEAST_EARTH = -0.9
+_SURE = 4.0
+_HARDLY = 1e-3
+_EDGE = 4.0
 
 
 class CellReading(NamedTuple):
@@ -99,6 +102,25 @@ def view_of(p: SunFilterParameters, i: int, sun_b: Vec3, margin: float) -> tuple
         elif above < 0.0:
             doubtful = False
     return cosine, seen, doubtful
+
+
+@kernel
+def rising(cosine: float, variance: float) -> tuple[float, float, float]:
+    """Mean of max(0, c) for a normal c, its slope over the mean of c, and the variance that the slope does not explain.
+
+    A linear model of a cell that may or may not see the Sun: statistical linearisation (Gelb 1974, section 6.2).
+    """
+    sigma = math.sqrt(variance)
+    z = cosine / sigma
+    if z > _SURE:
+        return cosine, 1.0, 0.0
+    if z < -_SURE:
+        return 0.0, 0.0, 0.0
+    share = 0.5 * (1.0 + math.erf(z * math.sqrt(0.5)))
+    density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    mean = cosine * share + sigma * density
+    square = (cosine * cosine + variance) * share + cosine * sigma * density
+    return mean, share, max(0.0, square - mean * mean - share * share * variance)
 
 
 @kernel
@@ -160,8 +182,15 @@ def read_cells(
         cloud = p.earth.clouds * mean_light
         cloud_state = GAIN + cells + i
         received = albedo + (cloud * x[X_GAIN + cells + i] if earth_known else 0.0)
+        # normals in n turn with the error, d(n) = theta x n
+        across = cross(multiply_transposed(dcm_bn, (cell.nx, cell.ny, cell.nz)), sun_n)
+        share, spread = (1.0 if seen else 0.0), 0.0
+        sunlit = max(cosine, 0.0)
+        if p.cos_half_view < _SMALLEST_STEP and cell.side == 0.0:
+            sunlit, share, spread = rising(cosine, _EDGE * quadratic(covariance, THETA, across) + 1e-9)
+            seen = share > _HARDLY
         if seen:
-            received += flux * max(cosine, 0.0)
+            received += flux * sunlit
         output, slope = respond(p.response, received)
         factor = cell.gain * (1.0 + x[X_GAIN + i])
         expected = factor * scale_now * output
@@ -170,11 +199,8 @@ def read_cells(
         if not earth_known and not seen and v < p.earth.largest * flux:
             continue
         slope *= factor * scale_now
-        # normals in n turn with the error, d(n) = theta x n; slopes are those of a turn theta seen in b
-        by_theta = (0.0, 0.0, 0.0)
-        if seen:
-            normal_n = multiply_transposed(dcm_bn, (cell.nx, cell.ny, cell.nz))
-            by_theta = scale(slope * flux, cross(normal_n, sun_n))
+        # slopes are those of a turn theta seen in b
+        by_theta = scale(slope * flux * share, across) if seen else (0.0, 0.0, 0.0)
         if earth_known:
             by_earth_n = multiply_transposed(dcm_bn, triple(m.earth_slopes[i], 0))
             by_theta = add(by_theta, scale(slope * earth_factor, by_earth_n))
@@ -187,7 +213,7 @@ def read_cells(
         innovation -= by_scale * correction[SCALE] + expected * correction[COMMON] + by_gain * correction[GAIN + i]
         if earth_known:
             innovation -= by_earth * correction[EARTH] + by_cloud * correction[cloud_state]
-        noise = p.errors.noise + more_noise
+        noise = p.errors.noise + more_noise + slope * slope * flux * flux * spread
         for j in range(states):
             total = by_theta[0] * covariance[j, 0] + by_theta[1] * covariance[j, 1] + by_theta[2] * covariance[j, 2]
             total += by_scale * covariance[j, SCALE] + expected * covariance[j, COMMON]

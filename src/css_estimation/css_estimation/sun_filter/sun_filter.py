@@ -23,7 +23,7 @@ from css_common.declared import builder
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
 from css_common.schema import Values
-from css_common.vectors import Vec3, matmul, multiply, scale, unit
+from css_common.vectors import Vec3, matmul, multiply, norm, scale, unit
 from css_estimation.sun import eclipse_detector
 from css_estimation.sun.eclipse_detector import EclipseState, detect_eclipse
 from css_estimation.sun.low_pass import low_pass, low_pass_gain
@@ -72,7 +72,8 @@ from css_estimation.sun_filter.motion import (
     wheel_momentum,
 )
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.sun_filter.reported import LARGEST, across, heading_covariance, mean_variance
+from css_estimation.sun_filter.reported import LARGEST, across, mean_variance
+from css_estimation.sun_filter.reported import heading as heading_of
 from css_estimation.sun_filter.sun_search import cost, least_cost, search
 
 MODE_WAITING = 0
@@ -268,14 +269,15 @@ def _search(
 
 
 @kernel
-def _forget_slowly(p: SunFilterParameters, dt: float, states: int, x, covariance) -> None:
-    """Errors of outputs and Earth go on."""
+def _forget_slowly(p: SunFilterParameters, dt: float, rate: float, states: int, x, covariance) -> None:
+    """Errors of outputs and Earth go on; on a body that turns [rad/s] a cell soon looks at other clouds."""
     cells = p.cells.shape[0]
     fade(SCALE, X_SCALE, 1, p.errors.scale_time, p.errors.scale, dt, states, x, covariance)
     fade(GAIN, X_GAIN, cells, p.errors.cell_time, p.errors.cell, dt, states, x, covariance)
     if states > GAIN + cells:
         fade(EARTH, X_EARTH, 1, p.earth.scale_time, p.earth.scale, dt, states, x, covariance)
-        fade(GAIN + cells, X_GAIN + cells, cells, p.earth.clouds_time, 1.0, dt, states, x, covariance)
+        clouds_time = 1.0 / (1.0 / p.earth.clouds_time + rate / p.earth.clouds_angle)
+        fade(GAIN + cells, X_GAIN + cells, cells, clouds_time, 1.0, dt, states, x, covariance)
 
 
 @kernel
@@ -298,8 +300,8 @@ def _lost(p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3,
 @kernel
 def _track(
     p: SunFilterParameters, state: SunFilterState, memory: SunFilterMemory, cycle: Cycle, voltages, aiding: Aiding
-) -> tuple[Progress, Rate, CellReading, int, int]:
-    """A cycle with an estimate; gives too what the best hypothesis read, its number, and the mode."""
+) -> tuple[Progress, Rate, CellReading, int]:
+    """A cycle with an estimate; gives too what the best hypothesis read, and the mode."""
     before = state.progress
     sun_n, dt = aiding.sky.sun_n, cycle.dt
     cells = p.cells.shape[0]
@@ -315,7 +317,7 @@ def _track(
         if cycle.model != state.rate.model:
             change_rate(p.motion, state.rate.model, cycle.model, state.rate.raw_b, cycle.wheels_b, x, covariance)
         omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, dt, states, x, covariance)
-        _forget_slowly(p, dt, states, x, covariance)
+        _forget_slowly(p, dt, norm(omega_b), states, x, covariance)
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
@@ -349,7 +351,7 @@ def _track(
                 reading = read
         best, left = give_up(memory)
     progress, mode = _progress(p, before, memory, best, left, cycle, use, faded, reading, voltages, aiding)
-    return progress, _filtered_rate(p, state.rate, cycle, raw_b), reading, best, mode
+    return progress, _filtered_rate(p, state.rate, cycle, raw_b), reading, mode
 
 
 @kernel
@@ -430,11 +432,8 @@ def step(
             reading = CellReading(0.0, 0, _readable(voltages), 0, 0, 0.0, 0.0)
         rate_source = RATE_GYRO if cycle.model == RATE_BY_GYRO else RATE_NONE
     else:
-        progress, rate, reading, best, mode = _track(p, state, memory, cycle, voltages, aiding)
-        x = memory.estimates[best]
-        sun_b = unit(multiply(dcm_of(x), aiding.sky.sun_n))
-        earth_known = progress.stage == _STAGE_ROLL
-        covariance = heading_covariance(p, x, memory.covariances[best], aiding.sky.sun_n, earth_known)
+        progress, rate, reading, mode = _track(p, state, memory, cycle, voltages, aiding)
+        sun_b, covariance = heading_of(p, memory, aiding.sky.sun_n, progress.stage == _STAGE_ROLL)
         if not (_finite(sun_b) and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
             # beyond what numbers can hold: nothing is known any more
             progress, rate = _AFRESH, Rate(rate.model, _NO_RATE, _NO_RATE)
