@@ -17,8 +17,8 @@ class SunAlgorithm(Protocol):
     where the rate comes from. The rate of the gyro, of successive Sun vectors and of the magnetic field is there for
     whoever wants it: `sun_tracking.finish_cycle`, with the parameters of `sun_tracking.TrackingParameters`. A filter
     with the rate in its state (`sun_filter`) writes its own instead and declares none of these but what it reads. What
-    the node does follows from what is declared: with `use_gyro` it hears the gyro, with `rate.use_field` the magnetometer, with
-    `use_wheels` the wheels, with `eclipse.source` or `use_orbit` it asks the flight's own sky.
+    the node does follows from what is declared: with `use_gyro` it hears the gyro, with `rate.use_field` the
+    magnetometer, with `use_wheels` the wheels, with `eclipse.source` or `use_orbit` it asks the flight's own sky.
 
     A module may also have `conflicts(values)`, as `Component.conflicts`, and, for the check of the control's gains, the
     share of a new measurement that one cycle takes in: `heading_gain(values)` for the direction, 1 without it, and
