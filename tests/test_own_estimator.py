@@ -56,7 +56,7 @@ def test_its_rate_is_the_one_at_which_the_sun_turns(mission):
     log = fly_directly(mission.with_overrides([*IDEAL, nodes]))
     estimate = log.estimates["alpha_beta_filter"]
     assert set(estimate.rate_source.tolist()) == {SunEstimate.RATE_SUN}
-    truth, sun_b = log.truth.omega_bn_b[-50:], estimate.sun_b[-50:]
+    truth, sun_b = log.having("truth").omega_bn_b[-50:], estimate.sun_b[-50:]
     across = truth - np.sum(truth * sun_b, axis=1, keepdims=True) * sun_b
     assert np.linalg.norm(across, axis=1).min() > 2e-3
     np.testing.assert_allclose(estimate.omega_bn_b[-50:], across, atol=1e-4)
@@ -71,6 +71,6 @@ def test_it_turns_the_arrays_to_the_sun(mission):
 
 def test_the_compiled_loop_flies_the_same(mission):
     mission = mission.with_overrides(["mission.duration=10"])
-    (trace,) = fly_cases(MissionFlight(mission), [0], 10, traced=True).trace
+    (trace,) = fly_cases(MissionFlight(mission), np.array([0]), 10, traced=True).trace
     estimate = fly_directly(mission).estimates["alpha_beta_filter"]
     np.testing.assert_array_equal(trace[:, 6:12], np.hstack([estimate.sun_b, estimate.omega_bn_b]))

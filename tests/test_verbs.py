@@ -26,7 +26,7 @@ def _executable(package: str, executable: str) -> Path:
 
 
 def _help(package: str, executable: str, verb: str = "") -> str:
-    command = [_executable(package, executable), "--help"]
+    command = [str(_executable(package, executable)), "--help"]
     typed = {"SUNPOINT_VERB": f"{verb}:{executable}"} if verb else {}
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=100, check=False, env={**os.environ, **typed}
@@ -84,6 +84,7 @@ def test_help_that_nobody_reads_is_no_error(package, executable):
     process = subprocess.Popen(
         [_executable(package, executable), "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
+    assert process.stdout is not None
     process.stdout.close()
     _, err = process.communicate(timeout=100)
     assert (process.returncode, err) == (0, b"")

@@ -160,7 +160,14 @@ class EarthErrors(NamedTuple):
     clouds_time: float = given(real("albedo.cloud_time", 70.0, "s", "correlation time of it", low=1.0, high=1e9))
     clouds_angle: float = made(  # [rad]
         math.radians,
-        real("albedo.cloud_angle_deg", 50.0, "deg", "turn of the body after which a cell looks at other clouds", low=1.0, high=1e6),
+        real(
+            "albedo.cloud_angle_deg",
+            50.0,
+            "deg",
+            "turn of the body after which a cell looks at other clouds",
+            low=1.0,
+            high=1e6,
+        ),
     )
     unknown: float = given(
         real("albedo.unknown", 0.1, "-", "light of an Earth that is not predicted, on one cell", low=0.0, high=1.0)
