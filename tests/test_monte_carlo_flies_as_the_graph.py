@@ -23,6 +23,29 @@ EVENTS = """
 # The flight begins in the shadow and leaves it after 31 s, while the gyro is off.
 OVERRIDES = ["mission.duration=60.0", "orbit.true_anomaly_deg=269.75"]
 CASE = 7
+# Everything that makes the truth harder at once, while the gyro comes and goes.
+HARDER = """
+/**:
+  ros__parameters:
+    extends: okeefe_sun_filter
+    mission: {epoch_spread_days: 365.0, duration: 60.0, case: 7}
+    orbit: {j2: true}
+    events:
+      gyro_off: {time: 20.0, node: gyro, action: deactivate}
+      gyro_on: {time: 45.0, node: gyro, action: activate}
+dynamics:
+  ros__parameters:
+    orbit: {model: j2_integrated}
+    dispersion: {orbit: {altitude: 100.0, raan_deg: 0.5, true_anomaly_deg: 0.5}, friction: 0.2}
+    friction: {coulomb: 0.0005, viscous: 0.000005}
+    tachometer: {resolution_rpm: 1.0, noise_rpm: 0.5}
+css_array:
+  ros__parameters:
+    albedo: {draw: correlated, drift_m_s: 50.0, drift_spread_m_s: 5.0, renewal_h: 0.02}
+    latency: 0.1
+gyro:
+  ros__parameters: {latency: 0.25, latency_spread: 0.1}
+"""
 FLOWN = estimators_by_mission(SunEstimator)
 SAFE_HOLD = [(name, estimator) for name in FLOWN if name.startswith("clark") for estimator in FLOWN[name]]
 RODS_ALONE = [name for name in MISSIONS if controlled_by(name, MagneticControl)]
@@ -85,3 +108,14 @@ def test_torque_rods_without_wheels_and_gyro_equal_the_composed_graph(name, tmp_
     trace = fly_cases(MissionFlight(mission), np.array([CASE]), 10, traced=True).trace[0]
     np.testing.assert_array_equal(trace, trace_of_log(log, mission.values.graph.estimator))
     assert len(trace) == 240
+
+
+def test_a_harder_truth_equals_the_composed_graph(tmp_path):
+    mission = mission_from_text(HARDER, "harder")
+    fly_composed(mission, tmp_path / "bag")
+    log = read_flight(tmp_path / "bag")
+    trace = fly_cases(MissionFlight(mission), np.array([CASE, 9]), 10, traced=True).trace[0]
+    np.testing.assert_array_equal(trace, trace_of_log(log, "sun_filter"))
+    assert log.true_wheels is not None and not np.array_equal(log.true_wheels.speed, log.having("wheels").speed)
+    assert log.epoch_ns == mission.epoch_ns and mission.epoch_ns % 10**9 == 0
+    assert len(trace) == 600

@@ -51,6 +51,7 @@ _SINGLE = {
     "rod_command": (RodDipoleCommand, "/rods/dipole_command"),
     "control": (ControlStatus, "/control/status"),
 }
+_TRUE_WHEELS = "/truth/wheels"  # beside the reported ones, where tachometers err
 LOGGED_TYPES: dict[str, type] = {
     f"css_msgs/msg/{kind.__name__}": kind for kind in (*_ESTIMATES, *(kind for kind, _ in _SINGLE.values()))
 }
@@ -88,6 +89,7 @@ class FlightLog:
         estimates: name of the estimator to `SunEstimate` columns.
         attitudes: name of the attitude filter to `AttitudeEstimate` columns.
         voltages, wheels, torque_command, rod_command, control: columns of the topic, None when there is none.
+        true_wheels: `WheelState` columns with the true speeds, None where those reported are true.
         notes: what could not be read, one line each.
         imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
             arrays of its mission are unknown.
@@ -103,6 +105,7 @@ class FlightLog:
     torque_command: Columns | None = None
     rod_command: Columns | None = None
     control: Columns | None = None
+    true_wheels: Columns | None = None
     notes: list[str] = field(default_factory=list)
     imported: bool = False
 
@@ -122,6 +125,9 @@ class FlightLog:
         if message_type in _ESTIMATES:
             attribute, _ = _ESTIMATES[message_type]
             getattr(self, attribute)[estimator_of(topic)] = columns
+            return
+        if topic == _TRUE_WHEELS and message_type is WheelState:
+            self.true_wheels = columns
             return
         for attribute, (kind, usual) in _SINGLE.items():
             if kind is not message_type:

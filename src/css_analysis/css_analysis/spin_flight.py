@@ -10,7 +10,7 @@ import numpy as np
 
 from css_common.attitude import mrp_to_dcm, quaternion_to_mrp
 from css_common.codec import Sample, codec_of, type_name
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.mission import Mission, mission_from_text
 from css_common.schema import Values
 from css_estimation.spin.coning import Passages
@@ -100,7 +100,7 @@ def _reasons(angles: Sequence[Sample]) -> Counter[str]:
 
 def passages_of(angles: Sequence[Sample], values: Values) -> Passages:
     """Passages of `SlitSunAngle` messages (sections mission and slits)."""
-    epoch_ns, frequency = parse_utc(values.mission.epoch), timer_frequency(values)
+    epoch_ns, frequency = mission_epoch(values.mission), timer_frequency(values)
     azimuths = np.asarray(head_azimuths(values))
     new = [a for a in angles if a.validity == SlitSunAngle.VALIDITY_VALID]
     time = np.array([(a.stamp_ns - epoch_ns) * 1e-9 - a.age for a in new])

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from css_common.codec import Sample
+from css_common.epochs import mission_epoch
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
-from css_common.sections import DURATION, EPOCH, epoch_of
+from css_common.sections import DURATION, EPOCH
 from css_common.shared_sections import conflicts, section_table
 
 if TYPE_CHECKING:
@@ -129,7 +130,7 @@ class Component:
         self.values = values
         self.report: Callable[[str], object] = _unheard
         self.period_ns = round(values.mission.period * 1e9)
-        self.epoch_ns = epoch_of(values)
+        self.epoch_ns = mission_epoch(values.mission)
         self.frames = {
             output.key: values.io.body_frame if output.frame == BODY else values.io.inertial_frame
             for output in self.outputs(name, values)

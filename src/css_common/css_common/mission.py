@@ -17,6 +17,7 @@ from typing import Any
 
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
+from css_common.epochs import mission_epoch
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
@@ -44,7 +45,7 @@ from css_common.schema import (
     shown,
     unknown_name,
 )
-from css_common.sections import EPOCH, epoch_of
+from css_common.sections import EPOCH
 from css_common.shared_sections import conflicts, shared_parameters
 
 __all__ = [
@@ -148,7 +149,7 @@ class Mission:
     @property
     def epoch_ns(self) -> int:
         """Stamp of step 0 [ns since 1970 UTC]."""
-        return epoch_of(self.values)
+        return mission_epoch(self.values.mission)
 
     @property
     def steps(self) -> int:

@@ -35,9 +35,15 @@ class Stream(IntEnum):
     WHEEL_LIMIT = 14
     ATTITUDE_GUESS = 15
     DIPOLE = 16
+    ORBIT = 17
+    LATENCY = 18
+    TACHOMETER = 19
+    WHEEL_FRICTION = 20
     SLIT_JITTER = 21
     SLIT_FAULT = 22
     SPIN_PHASE = 23
+    CLOUDS = 24
+    EPOCH = 25
 
 
 class RandomKey(NamedTuple):

@@ -25,6 +25,14 @@ _MOST_STEPS = 10**9
 _LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
 EPOCH = text("mission.epoch", "", "UTC instant of the first step", example='mission: {epoch: "2026-06-01T00:00:00Z"}')
+EPOCH_SPREAD = real(
+    "mission.epoch_spread_days",
+    0.0,
+    "d",
+    "cases begin at instants within so many days after the epoch, each at one of its own",
+    low=0.0,
+    high=20_000.0,
+)
 DURATION = real(
     "mission.duration",
     None,
@@ -43,6 +51,7 @@ MISSION: Table = (
     text("mission.name", "unnamed", "name of the mission, as in the file name"),
     text("mission.description", "", "one line for reports"),
     EPOCH,
+    EPOCH_SPREAD,
     DURATION,
     PERIOD,
     SEED,
@@ -113,7 +122,13 @@ ORBIT: Table = (
     real("orbit.raan_deg", 0.0, "deg", "right ascension of the ascending node", low=-360.0, high=360.0),
     real("orbit.argument_of_perigee_deg", 0.0, "deg", "argument of perigee", low=-360.0, high=360.0),
     real("orbit.true_anomaly_deg", 0.0, "deg", "true anomaly at the epoch", low=-360.0, high=360.0),
-    flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2"),
+    choice(
+        "orbit.model",
+        "secular",
+        ("secular", "j2_integrated"),
+        "elements that stand still or drift evenly, or motion from them integrated under J2, short periods included",
+    ),
+    flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2, of the secular model"),
     text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
     text("orbit.tle_line2", "", "second line of the element set"),
     LAUNCH_LATITUDE,
@@ -286,11 +301,6 @@ def name_for_files(text: str) -> str:
     return kept.encode()[:_LONGEST_NAME].decode(errors="ignore")
 
 
-def epoch_of(values: Values) -> int:
-    """Stamp of step 0 [ns since 1970 UTC]; 0 in the mission of nodes that ask for none."""
-    return parse_utc(values[EPOCH]) if values[EPOCH] else 0
-
-
 def needed_of_orbit(values: Values) -> tuple[str, ...]:
     """What a component cannot do without that has to know where the spacecraft is."""
     launch = (LAUNCH_LATITUDE, LAUNCH_LONGITUDE, LAUNCH_AZIMUTH, LAUNCH_ELEVATION, LAUNCH_APOGEE)
@@ -354,7 +364,8 @@ def _mission_conflicts(mission: Values) -> Iterator[str]:
     except ValueError as error:
         yield f"mission.epoch: {error}"
         return
-    if begin < 0 or begin + duration * 1e9 >= _LAST_STAMP_NS:
+    spread_s = mission.epoch_spread_days * 86_400.0
+    if begin < 0 or begin + (spread_s + duration) * 1e9 >= _LAST_STAMP_NS:
         yield (
             f"mission.epoch: {mission.epoch} given, expected {f'a flight of {duration:g} s' if duration else 'one'} "
             "between 1970-01-01 and 2038-01-19: the seconds of a ROS stamp have 32 bits"
@@ -366,6 +377,8 @@ def _orbit_conflicts(orbit: Values) -> Iterator[str]:
         for key in ("tle_line1", "tle_line2"):
             if len(getattr(orbit, key)) != 69:
                 yield f"orbit.{key}: expected the 69 characters of a two-line element set"
+    if orbit.model == "j2_integrated" and orbit.source in ("tle", "ballistic"):
+        yield f"orbit.model: j2_integrated given with orbit.source {orbit.source}, expected elements as the source"
     if orbit.source != "elements":
         return
     if orbit.altitude < _LOWEST:

@@ -7,7 +7,7 @@ The simulated truth builds one with the truth's parameters, flight software one 
 import math
 from functools import lru_cache
 
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_common.sections import (
@@ -23,7 +23,7 @@ from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.magnetic_field import HIGHEST_DEGREE
-from css_environment.orbit import Orbit, TleOrbit, keplerian_orbit
+from css_environment.orbit import IntegratedOrbit, Orbit, TleOrbit, keplerian_orbit
 
 # Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
 _segment_tables = lru_cache(maxsize=4)(ephemeris.build_ephemeris)
@@ -50,10 +50,10 @@ def mission_orbit(values: Values) -> Orbit:
     """
     o = values.orbit
     if o.source == "ballistic":
-        return _arc(mission_launch(values), parse_utc(values.mission.epoch))
+        return _arc(mission_launch(values), mission_epoch(values.mission))
     if o.source == "tle":
         return TleOrbit(o.tle_line1, o.tle_line2)
-    return keplerian_orbit(
+    elements = keplerian_orbit(
         EARTH_RADIUS + o.altitude,
         o.eccentricity,
         o.inclination_deg,
@@ -62,13 +62,20 @@ def mission_orbit(values: Values) -> Orbit:
         o.true_anomaly_deg,
         o.j2,
     )
+    return IntegratedOrbit(elements) if o.model == "j2_integrated" else elements
 
 
 class MissionEnvironment:
     """Environment of the mission's `orbit` section."""
 
     def __init__(
-        self, values: Values, *, field: bool, conical_shadow: bool = True, field_degree: int = HIGHEST_DEGREE
+        self,
+        values: Values,
+        *,
+        field: bool,
+        conical_shadow: bool = True,
+        field_degree: int = HIGHEST_DEGREE,
+        orbit: Orbit | None = None,
     ) -> None:
         """Prepares the tables.
 
@@ -77,9 +84,10 @@ class MissionEnvironment:
             field: compute the geomagnetic field; else it is zero.
             conical_shadow: shape of the Earth's shadow, with a penumbra or a cylinder.
             field_degree: highest degree of the field's spherical harmonics.
+            orbit: None: that of the section.
         """
-        self._orbit = mission_orbit(values)
-        self._epoch_ns = parse_utc(values.mission.epoch)
+        self._orbit = mission_orbit(values) if orbit is None else orbit
+        self._epoch_ns = mission_epoch(values.mission)
         self._field = field
         self._conical_shadow = conical_shadow
         self._field_degree = field_degree

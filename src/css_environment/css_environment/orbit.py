@@ -1,16 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Orbits: Keplerian elements with the secular drift of J2, or a two-line element set, at many times.
+"""Orbits at many times: Keplerian elements with the secular drift of J2 or integrated under it, or a TLE.
 
 Frame n is the mean equator and equinox of J2000 (its 0.02 arcsec bias to the ICRS is ignored).
 """
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import erfa
 import numpy as np
 
 from css_environment.constants import EARTH_J2, EARTH_MU, EARTH_RADIUS
+from css_environment.j2_integration import J2Track
 from css_environment.time_scales import terrestrial_date, utc_date
 
 
@@ -33,7 +35,13 @@ class TleOrbit(NamedTuple):
     line2: str
 
 
-Orbit = KeplerianOrbit | TleOrbit
+class IntegratedOrbit(NamedTuple):
+    """Motion under the Earth's gravity with J2, integrated; the elements are osculating at the epoch."""
+
+    elements: KeplerianOrbit  # of the two-body orbit that has the same position and velocity at the epoch
+
+
+Orbit = KeplerianOrbit | IntegratedOrbit | TleOrbit
 
 
 def keplerian_orbit(
@@ -67,7 +75,15 @@ def orbit_states(orbit: Orbit, epoch_ns: int, elapsed_s) -> tuple[np.ndarray, np
     elapsed_s = np.atleast_1d(np.asarray(elapsed_s, dtype=float))
     if isinstance(orbit, TleOrbit):
         return _tle_states(orbit, epoch_ns, elapsed_s)
+    if isinstance(orbit, IntegratedOrbit):
+        return _track(orbit).states(elapsed_s)
     return _keplerian_states(orbit, elapsed_s)
+
+
+@lru_cache(maxsize=16)
+def _track(orbit: IntegratedOrbit) -> J2Track:
+    r_n, v_n = _keplerian_states(orbit.elements._replace(j2=0.0), np.zeros(1))
+    return J2Track(r_n[0], v_n[0])
 
 
 def secular_rates(orbit: KeplerianOrbit) -> tuple[float, float, float]:

@@ -7,13 +7,13 @@ from datetime import UTC, datetime
 import numpy as np
 
 from css_common.component import Finding
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.schema import Values
 from css_environment.ballistic import geodetic_heights
 from css_environment.constants import EARTH_RADIUS
 from css_environment.magnetic_field import LAST_YEAR
 from css_environment.mission_environment import mission_orbit
-from css_environment.orbit import KeplerianOrbit, TleOrbit, orbit_states
+from css_environment.orbit import IntegratedOrbit, KeplerianOrbit, TleOrbit, orbit_states
 from css_environment.tle_checks import tle_findings
 
 LONGEST_EXTRAPOLATION = 5
@@ -31,12 +31,14 @@ _SECOND_NS = 10**9
 
 def orbit_findings(values: Values) -> Iterator[Finding]:
     """What is wrong with a mission's orbit over its flight (sections mission and orbit)."""
-    epoch_ns, duration_s = parse_utc(values.mission.epoch), values.mission.duration
+    epoch_ns, duration_s = mission_epoch(values.mission), values.mission.duration
     try:
         orbit = mission_orbit(values)
     except ValueError as error:
         yield Finding(f"orbit.launch.apogee: {error}, expected one that an arc from there reaches", refused=True)
         return
+    if isinstance(orbit, IntegratedOrbit):
+        orbit = orbit.elements
     if isinstance(orbit, TleOrbit):
         yield from tle_findings(orbit, epoch_ns, duration_s)
     elif values.orbit.source == "ballistic":
@@ -61,7 +63,7 @@ def _arc_findings(orbit: KeplerianOrbit, epoch_ns: int, duration_s: float) -> It
 
 def field_findings(values: Values) -> Iterator[Finding]:
     """What is wrong with the geomagnetic field over the flight, where it is used (sections mission and orbit)."""
-    end_ns = parse_utc(values.mission.epoch) + round(values.mission.duration * 1e9)
+    end_ns = mission_epoch(values.mission) + round(values.mission.duration * 1e9)
     end = datetime.fromtimestamp(end_ns / _SECOND_NS, tz=UTC)
     beyond = (end - datetime(LAST_YEAR, 1, 1, tzinfo=UTC)).total_seconds() / (365.25 * 86_400.0)
     if beyond > 0.0:

@@ -119,10 +119,10 @@ def draw_reflectivity(reflectivity: Reflectivity, key: RandomKey, common: bool, 
 
 
 @kernel
-def _draws_of_cells(key: RandomKey, out) -> None:
-    """(N,) independent normal draws, those of `draw_reflectivity`."""
+def draws_of_cells(key: RandomKey, number: int, out) -> None:
+    """(N,) independent normal draws of a field; number 0 has those of `draw_reflectivity`."""
     for cell in range(out.shape[0]):
-        out[cell] = normal4(key, Stream.ALBEDO, 1, cell // 4)[cell % 4]
+        out[cell] = normal4(key, Stream.ALBEDO, 1 + number, cell // 4)[cell % 4]
 
 
 def draw_correlated(reflectivity: Reflectivity, key: RandomKey, length: float) -> np.ndarray:
@@ -135,13 +135,13 @@ def draw_correlated(reflectivity: Reflectivity, key: RandomKey, length: float) -
     """
     rows, columns = reflectivity.mean.shape
     draws = np.zeros(rows * columns)
-    _draws_of_cells(key, draws)
-    field = (_smoothing(rows, columns, length) @ draws).reshape(rows, columns)
+    draws_of_cells(key, 0, draws)
+    field = (smoothing(rows, columns, length) @ draws).reshape(rows, columns)
     return np.clip(reflectivity.mean + reflectivity.std * field, LOWEST, HIGHEST)
 
 
 @lru_cache(maxsize=2)
-def _smoothing(rows: int, columns: int, length: float) -> np.ndarray:
+def smoothing(rows: int, columns: int, length: float) -> np.ndarray:
     """(cells, cells) weights of independent draws, of unit norm for each cell: equal areas count equally."""
     latitude = np.pi * ((np.arange(rows) + 0.5) / rows - 0.5)
     longitude = 2.0 * np.pi * ((np.arange(columns) + 0.5) / columns - 0.5)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.declared import built, given
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.kernel import typed_call
 from css_common.schema import Values, choice, real
 from css_environment.earth_light import albedo_sources, new_earth_view, new_light
@@ -39,7 +39,7 @@ class PredictedLight:
     def __init__(self, values: Values) -> None:
         """Takes section mission and the parameters of `MeanEarth`."""
         p = built(MeanEarth, values)
-        grid = named_reflectivity(p.reflectivity, p.constant, parse_utc(values.mission.epoch))
+        grid = named_reflectivity(p.reflectivity, p.constant, mission_epoch(values.mission))
         self._reflectivity = np.minimum(p.factor * grid.mean, 1.0)
         self.light = new_light()
         self._view = new_earth_view()

@@ -42,6 +42,7 @@ class SunFilterFlight:
         self.white = white
         self.light = new_light()
         self.sky = UNKNOWN_SKY
+        self.field_n = None
         if earth is not None:
             r_n = tuple(6.778e6 * np.asarray(unit(earth)))
             albedo_sources(new_earth_view(), r_n, self.sun_n, 1.0, IDENTITY, np.full((36, 72), 0.3), self.light)
@@ -86,6 +87,12 @@ class SunFilterFlight:
             wheels_valid=wheels,
             sky=self.sky._replace(illumination=part),
         )
+        if self.field_n is not None:
+            aiding = aiding._replace(
+                field_b=multiply(self.dcm_bn, self.field_n),
+                field_valid=True,
+                sky=aiding.sky._replace(field_n=self.field_n),
+            )
         self.state, result = self.algorithm.step(self.p, self.state, self.memory, DT, voltages, aiding)
         return result
 

@@ -34,6 +34,7 @@ def test_the_estimator_reports_that_the_pyramid_was_adopted():
         "cells.normals": NORMALS.ravel().tolist(),
         "cells.clip_normal": [0.0, 0.0, 0.0],
         "spacecraft.array_normal": PANEL.tolist(),
+        "mission.epoch": "2013-06-01T00:00:00Z",
     }
     component = PyramidSwitch("safe", shaped_values(table, checked_values(table, given)))
     lines: list[Any] = []

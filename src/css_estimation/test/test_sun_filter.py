@@ -22,6 +22,7 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_VALID,
 )
 from css_estimation.sun_filter import sun_filter
+from css_estimation.sun_filter.cell_update import rising
 from css_estimation.sun_filter.response import respond
 
 SIX = LAYOUTS["six faces"]
@@ -121,24 +122,31 @@ def test_one_cell_broken_from_the_start_does_not_hide_the_sun():
 @pytest.mark.parametrize("known", [True, False], ids=["orbit", "no orbit"])
 def test_dusk_is_no_turn(known):
     """Outputs that fade together leave direction and rate alone; the dark then holds them by angular momentum."""
-    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
-    if known:
-        flight.sky = flight.sky._replace(known=True, sun_n=flight.sun_n)
-    flight.fly(200.0)
-    worst = 0.0
-    for part in np.linspace(1.0, 0.0, 82):
-        heading = flight.step(part=float(part))
-        worst = max(worst, flight.error_deg(heading))
-    heading = flight.fly(600.0, part=0.0)
-    assert worst < 0.3
-    assert (heading.validity, heading.mode) == (VALIDITY_HELD, sun_filter.MODE_COASTING)
-    assert heading.rate_source == RATE_MOMENTUM
+    errors, normalised, dawn = [], [], []
+    for seed in range(4):
+        flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, seed, white=0.002, **NO_EARTH)
+        if known:
+            flight.sky = flight.sky._replace(known=True, sun_n=flight.sun_n)
+        flight.fly(200.0)
+        worst = 0.0
+        for part in np.linspace(1.0, 0.0, 82):
+            heading = flight.step(part=float(part))
+            worst = max(worst, flight.error_deg(heading))
+        heading = flight.fly(600.0, part=0.0)
+        assert worst < 0.3
+        assert (heading.validity, heading.mode) == (VALIDITY_HELD, sun_filter.MODE_COASTING)
+        assert heading.rate_source == RATE_MOMENTUM
+        errors.append(flight.error_deg(heading))
+        normalised.append(np.radians(errors[-1]) ** 2 / sum(heading.covariance[::4]))
+        assert np.degrees(np.linalg.norm(np.subtract(heading.omega_bn_b, flight.omega))) < 0.01
+        heading = flight.fly(60.0)
+        assert heading.validity == VALIDITY_VALID
+        # one cell is lit here, which says nothing of one of the two angles
+        dawn.append(flight.error_deg(heading))
     # the orbit says when the penumbra begins; without it the first tenth of the fading is taken for a turn
-    assert flight.error_deg(heading) < (1.0 if known else 2.0)
-    assert np.degrees(np.linalg.norm(np.subtract(heading.omega_bn_b, flight.omega))) < 0.01
-    heading = flight.fly(60.0)
-    assert heading.validity == VALIDITY_VALID
-    assert flight.error_deg(heading) < 0.5
+    assert np.mean(errors) < (1.0 if known else 3.0)
+    assert np.mean(normalised) < 1.5
+    assert np.mean(dawn) < 0.5
 
 
 def test_in_the_dark_a_change_of_the_wheels_is_a_change_of_the_rate():
@@ -261,3 +269,30 @@ def test_the_slope_of_a_response_is_its_derivative(curve):
     for light in (0.1, 0.4, 0.6, 0.9):
         above, below = respond(p, light + 1e-6)[0], respond(p, light - 1e-6)[0]
         assert respond(p, light)[1] == pytest.approx((above - below) / 2e-6, rel=1e-6)
+
+
+@pytest.mark.parametrize("mean", [-0.3, -0.05, -0.01, 0.0, 0.02, 0.08, 0.5])
+def test_a_cell_at_grazing_light_is_taken_for_both(mean):
+    """Mean, best slope and what it leaves of max(0, c), against quadrature over a normal c."""
+    sigma = 0.05
+    c = mean + sigma * np.linspace(-8.0, 8.0, 20001)
+    weights = np.exp(-0.5 * ((c - mean) / sigma) ** 2)
+    weights /= weights.sum()
+    lit = np.maximum(c, 0.0)
+    expected = weights @ lit
+    slope = weights @ ((c - mean) * lit) / sigma**2
+    left = weights @ (lit - expected - slope * (c - mean)) ** 2
+    np.testing.assert_allclose(rising(mean, sigma**2), (expected, slope, left), atol=2e-6)
+
+
+def test_faces_that_graze_the_sun_do_not_mislead():
+    """The kink at 90 deg: a linear filter is sure of a side that it cannot know, and stays degrees off."""
+    for seed in range(6):
+        flight = SunFilterFlight(unit((0.05, -0.03, 1.0)), (0.004, 0.03, -0.01), seed, 0.005, (0.5, 0.8, 0.3), **SIX)
+        errors, normalised = [], []
+        for _ in range(900):
+            heading = flight.step()
+            errors.append(flight.error_deg(heading))
+            normalised.append(np.radians(errors[-1]) ** 2 / sum(heading.covariance[::4]))
+        assert np.mean(errors[600:]) < 1.0
+        assert np.mean(normalised[300:]) < 4.0

@@ -29,6 +29,7 @@ QUIET = P._replace(gyro_noise=0.0, torque=0.0, acceleration=0.0, anisotropy=0.0)
 MODELS = pytest.mark.parametrize("model", [RATE_BY_GYRO, RATE_BY_MOMENTUM, RATE_BY_WALK])
 GYRO_B, WHEELS_B, DT = (0.02, -0.01, 0.03), (0.05, 0.02, -0.08), 0.1
 INERTIA = np.array(P.inertia)
+NOWHERE = (0.0, 0.0, 0.0)
 
 
 def test_matrices():
@@ -52,7 +53,7 @@ def start(model):
 def moved(model, x, states=GAIN + 8):
     """The estimate one step later."""
     x = x.copy()
-    go_on(QUIET, model, GYRO_B, WHEELS_B, DT, states, x, np.zeros((states, states)))
+    go_on(QUIET, model, GYRO_B, WHEELS_B, NOWHERE, DT, states, x, np.zeros((states, states)))
     return x
 
 
@@ -80,7 +81,7 @@ def test_the_covariance_goes_on_as_small_errors_do(model):
     before, after = covariance[:6, :6].copy(), moved(model, x)
     step = 1e-5
     jacobian = np.column_stack([error_of(moved(model, shifted(x, step * unit)), after) / step for unit in np.eye(6)])
-    go_on(QUIET, model, GYRO_B, WHEELS_B, DT, GAIN + 8, x, covariance)
+    go_on(QUIET, model, GYRO_B, WHEELS_B, NOWHERE, DT, GAIN + 8, x, covariance)
     np.testing.assert_allclose(covariance[:6, :6], jacobian @ before @ jacobian.T, rtol=2e-3, atol=2e-9)
 
 
@@ -89,7 +90,7 @@ def test_momentum_is_conserved_in_n_and_the_rate_follows_the_wheels():
     momentum_n = np.array(dcm_of(x)).T @ x[X_RATE : X_RATE + 3]
     for k in range(1000):
         wheels_b = tuple(np.array(WHEELS_B) * np.cos(0.01 * k))
-        omega = go_on(P, RATE_BY_MOMENTUM, GYRO_B, wheels_b, DT, GAIN + 8, x, covariance)
+        omega = go_on(P, RATE_BY_MOMENTUM, GYRO_B, wheels_b, NOWHERE, DT, GAIN + 8, x, covariance)
     np.testing.assert_allclose(np.array(dcm_of(x)).T @ x[X_RATE : X_RATE + 3], momentum_n, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(INERTIA @ omega + wheels_b, x[X_RATE : X_RATE + 3], rtol=2e-3)
 
@@ -103,22 +104,38 @@ def test_a_free_body_turns_as_euler_says():
         middle = w - 0.5 * (100.0 / fine) * np.linalg.solve(INERTIA, np.cross(w, INERTIA @ w))
         w = w - (100.0 / fine) * np.linalg.solve(INERTIA, np.cross(middle, INERTIA @ middle))
     for _ in range(1000):
-        go_on(P, RATE_BY_MOMENTUM, GYRO_B, (0.0, 0.0, 0.0), DT, GAIN + 8, x, covariance)
+        go_on(P, RATE_BY_MOMENTUM, GYRO_B, (0.0, 0.0, 0.0), NOWHERE, DT, GAIN + 8, x, covariance)
     np.testing.assert_allclose(np.linalg.solve(INERTIA, x[X_RATE : X_RATE + 3]), w, rtol=1e-4)
+
+
+def test_gravity_turns_the_momentum_by_its_torque_once_it_is_reckoned_with():
+    r_n = (4.0e6, -3.0e6, 4.6e6)
+    changes = []
+    for asked in (False, True):
+        x, covariance = start(RATE_BY_MOMENTUM)
+        dcm_bn, momentum_b = np.array(dcm_of(x)), x[X_RATE : X_RATE + 3].copy()
+        p = QUIET._replace(gravity_gradient=asked)
+        go_on(p, RATE_BY_MOMENTUM, GYRO_B, WHEELS_B, r_n, DT, GAIN + 8, x, covariance)
+        changes.append(np.array(dcm_of(x)).T @ x[X_RATE : X_RATE + 3] - dcm_bn.T @ momentum_b)
+    nadir_b = -dcm_bn @ r_n / np.linalg.norm(r_n)
+    torque_b = 3.0 * 3.986004418e14 / np.linalg.norm(r_n) ** 3 * np.cross(nadir_b, INERTIA @ nadir_b)
+    np.testing.assert_allclose(changes[0], 0.0, atol=1e-15)
+    np.testing.assert_allclose(changes[1], DT * dcm_bn.T @ torque_b, rtol=1e-6)
+    assert np.linalg.norm(torque_b) > 1e-7
 
 
 @MODELS
 @pytest.mark.parametrize("after", [RATE_BY_GYRO, RATE_BY_MOMENTUM, RATE_BY_WALK])
 def test_another_source_of_the_rate_begins_with_the_rate_of_the_last(model, after):
     x, covariance = start(model)
-    omega = go_on(P, model, GYRO_B, WHEELS_B, DT, GAIN + 8, x, covariance)
+    omega = go_on(P, model, GYRO_B, WHEELS_B, NOWHERE, DT, GAIN + 8, x, covariance)
     change_rate(P, model, after, omega, WHEELS_B, x, covariance)
     rate = covariance[RATE : RATE + 3, RATE : RATE + 3]
     assert np.linalg.eigvalsh(rate).min() > 0.0 and not covariance[THETA : THETA + 3, RATE : RATE + 3].any()
     if after == RATE_BY_GYRO:
         assert not x[X_RATE : X_RATE + 3].any() and rate[0, 0] == P.gyro_bias
         return
-    now = go_on(P, after, GYRO_B, WHEELS_B, 1e-9, GAIN + 8, x, covariance)
+    now = go_on(P, after, GYRO_B, WHEELS_B, NOWHERE, 1e-9, GAIN + 8, x, covariance)
     np.testing.assert_allclose(now, omega, atol=1e-9)
 
 

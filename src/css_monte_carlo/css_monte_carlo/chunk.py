@@ -74,6 +74,20 @@ def fly_cases(
     flight: MissionFlight, numbers: np.ndarray, sample_every: int, guess_deg: float = 0.0, traced: bool = False
 ) -> Flown:
     """Flies cases (C,) of a mission, each independent of the others; `guess_deg` as of `MissionFlight.cases`."""
+    if not flight.own_surroundings:
+        return _fly_together(flight, numbers, sample_every, guess_deg, traced)
+    parts = [
+        _fly_together(flight.around_case(int(number)), np.array([number]), sample_every, guess_deg, traced)
+        for number in numbers
+    ]
+    trace = np.concatenate([part.trace for part in parts])
+    return Flown(_joined([part.tallies for part in parts]), trace, sum(part.cpu_s for part in parts))
+
+
+def _fly_together(
+    flight: MissionFlight, numbers: np.ndarray, sample_every: int, guess_deg: float, traced: bool
+) -> Flown:
+    """Flies cases that share their surroundings."""
     cases, initial = flight.cases(numbers, guess_deg)
     period_s = flight.mission.period_ns * 1e-9
     tallies = flight.measure.new_tallies(len(numbers), flight.steps, period_s, sample_every, windows_of(flight.mission))

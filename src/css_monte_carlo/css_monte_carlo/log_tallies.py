@@ -87,10 +87,11 @@ def _rows_by_step(log: FlightLog, pairs: tuple[np.ndarray, np.ndarray] | None) -
 def _wheel_momentum(log: FlightLog, wheels: np.ndarray) -> np.ndarray:
     """(K, 3) momentum of all wheels in b [N m s]."""
     truth = log.having("truth")
-    if log.wheels is None or len(wheels) == 0:
+    true = log.wheels if log.true_wheels is None else log.true_wheels
+    if true is None or len(wheels) == 0:
         return np.zeros((len(truth), 3))
     axes = np.stack([wheels["gx"], wheels["gy"], wheels["gz"]], axis=1)
-    return (wheels["inertia"] * (log.wheels.speed + truth.omega_bn_b @ axes.T)) @ axes
+    return (wheels["inertia"] * (true.speed + truth.omega_bn_b @ axes.T)) @ axes
 
 
 def _rod_dipoles(log: FlightLog) -> list[float]:

@@ -15,16 +15,18 @@ from css_common.kernel import kernel, study_kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply, row
 from css_environment.albedo_vector import PATCHES, point_source
-from css_estimation.sun.sun_heading import Aiding, Sky
+from css_environment.moving_clouds import CloudMotion, Clouds, is_cloud_step, reflect
+from css_estimation.sun.sun_heading import Aiding
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
-from css_sim import gyro, magnetometer
+from css_sim import gyro, magnetometer, tachometer
 from css_sim.disturbances import with_dipole
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
-from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, sense
+from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, draw_lags, sense
 from css_sim.spacecraft import Spacecraft, advance
+from css_sim.tachometer import Tachometer
 from sunpoint_control.held_field import HeldField
 
 
@@ -35,6 +37,7 @@ class Vehicle(NamedTuple):
     sensors: Sensors
     own_earth: bool  # each case has its own reflectivities
     albedo_model: int  # of `albedo_vector`
+    clouds: Clouds
     heading_hears_field: bool
     control_hears_field: bool
     heading_hears_wheels: bool
@@ -42,6 +45,7 @@ class Vehicle(NamedTuple):
     attitude: Any  # parameters of the attitude filter, or None
     control: Any  # parameters of the control law, or None
     craft: Spacecraft  # nominal
+    tachometer: Tachometer
     array_normal_b: Vec3
 
 
@@ -64,10 +68,13 @@ class Cases(NamedTuple):
     rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
     faults: np.ndarray  # (C, F) of cell_faults.FAULT
-    reflectivity: np.ndarray  # (C, rows, columns); (0, 0, 0) when the Earth is common
+    reflectivity: np.ndarray  # (C, rows, columns), written where clouds move; (0, 0, 0) when the Earth is common
+    cloud_fields: np.ndarray  # (C, F, rows, columns) of clouds that move; else (0, 0, 0, 0)
+    cloud_motion: np.ndarray  # (C, 3) of `moving_clouds.CloudMotion`
     light: np.ndarray  # (C, 192) room for the light of an own Earth
     albedo: np.ndarray  # (C, n) room for the light of the Earth on each cell
     work: np.ndarray  # (C, 224) room for its sum
+    history: np.ndarray  # (C, L) of latency.MOMENT, what late sensors still sense
 
 
 class CaseState(NamedTuple):
@@ -114,7 +121,9 @@ def fly_block(
         key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
         cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
-        sensors = SensorsOfCase(key, cells, gyro_errors, magnetometer.draw_bias(v.sensors.magnetometer, key))
+        field_bias_b = magnetometer.draw_bias(v.sensors.magnetometer, key)
+        lags = draw_lags(v.sensors, key)
+        sensors = SensorsOfCase(key, cells, gyro_errors, field_bias_b, lags, cases.history[c])
         rotation, field_b, field_step = state.rotation, state.field_b, state.field_step
         heading_state, attitude_state, control_state = state.heading, state.attitude, state.control
         for k in range(marks.shape[0]):
@@ -125,14 +134,17 @@ def fly_block(
             light = around.light[min(k, around.light.shape[0] - 1)]
             if v.own_earth:
                 light = cases.light[c]
+                elapsed_ns = step * v.period_ns
+                if v.clouds.moving and (k == 0 or is_cloud_step(elapsed_ns, v.period_ns)):
+                    motion = CloudMotion(*row(cases.cloud_motion, c))
+                    reflect(v.clouds, motion, cases.cloud_fields[c], elapsed_ns, cases.reflectivity[c])
                 _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
-            read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation.omega_bn_b, environment, light, voltages)
+            read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation, environment, light, voltages)
             if read.field_valid:
                 field_b, field_step = read.field_b, step
             wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
-            known, predicted, sun_n, solar_flux, illumination = sky_at(around.sky, k)
-            sky_light = around.sky_light[min(k, around.sky_light.shape[0] - 1)]
-            sky = Sky(known, predicted, sun_n, solar_flux, illumination, sky_light)
+            tachometer.report(v.tachometer, key, step, speeds)
+            sky = sky_at(around.sky, around.sky_light, k)
             field_is_new = v.heading_hears_field and read.field_valid
             aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
             heading_state, heading = estimate_heading(

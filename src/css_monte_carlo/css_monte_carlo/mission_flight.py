@@ -33,8 +33,11 @@ from css_sim import (
     earth_reflectivity,
     gyro,
     initial_conditions,
+    latency,
     magnetometer,
+    orbit_dispersion,
     sun_cells,
+    tachometer,
 )
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
@@ -61,7 +64,8 @@ class MissionFlight:
         mission: what flies.
         steps: control cycles of a flight.
         measure: how the estimator of interest is measured.
-        surroundings: the environment that all cases share.
+        own_surroundings: cases differ in orbit or epoch, and share neither `surroundings` nor `marks`.
+        surroundings: the environment that all cases share, or that of one case.
         marks: (steps,) what is special about each step, see `case_tallies.step_marks`.
     """
 
@@ -87,6 +91,9 @@ class MissionFlight:
         common = None
         if self._grid is not None:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
+        values = mission.values.mission
+        self.own_surroundings = orbit_dispersion.is_dispersed(self._plant.values) or values.epoch_spread_days > 0.0
+        self._measured = estimator
         self.surroundings = SurroundingsTables(
             self._plant.values,
             _values(self._heading),
@@ -95,9 +102,14 @@ class MissionFlight:
             self._own_earth,
             self._feels_field(),
             MODELS[array.albedo.model],
+            orbit_dispersion.case_orbit(self._plant.values, self._key(values.case)),
         )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
         self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
+
+    def around_case(self, case: int) -> "MissionFlight":
+        """The same flights in the surroundings of a case, where cases differ in theirs (`own_surroundings`)."""
+        return MissionFlight(self.mission.with_overrides([f"mission.case={case}"]), self._measured)
 
     @property
     def trace_columns(self) -> int:
@@ -132,9 +144,13 @@ class MissionFlight:
         model = cell_errors.error_model(array)
         for row, key in zip(cells, keys, strict=True):
             cell_errors.draw_cells(model, key, nominal, row)
-        earths = np.zeros((0, 0, 0))
+        earths, motions, fields = np.zeros((0, 0, 0)), np.zeros((0, 3)), np.zeros((0, 0, 0, 0))
         if self._own_earth:
             assert self._grid is not None
+            if earth_reflectivity.clouds_move(array):
+                clouds = [earth_reflectivity.case_clouds(array, self._grid, key) for key in keys]
+                motions = np.array([motion for motion, _ in clouds])
+                fields = np.stack([of_case for _, of_case in clouds])
             earths = np.stack([earth_reflectivity.case_reflectivity(array, self._grid, key) for key in keys])
         momentum = np.stack(
             [
@@ -160,9 +176,12 @@ class MissionFlight:
             cells=cells,
             faults=self._faults(array, numbers),
             reflectivity=earths,
+            cloud_fields=fields,
+            cloud_motion=motions,
             light=aligned_table(len(keys) if self._own_earth else 0, len(new_light())),
             albedo=np.zeros((len(keys), len(nominal))),
             work=aligned_table(len(keys), len(new_workspace())),
+            history=np.stack([latency.new_history(max(map(latency.longest_lag, self._latencies())))] * len(keys)),
         )
         control = None
         if self._control is not None:
@@ -207,6 +226,7 @@ class MissionFlight:
             sensors=self._sensors(values, done, is_heard),
             own_earth=self._own_earth,
             albedo_model=MODELS[array.albedo.model],
+            clouds=earth_reflectivity.clouds(self._array.values, self._grid),
             heading_hears_field=heading_hears,
             control_hears_field=control_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),
@@ -214,6 +234,7 @@ class MissionFlight:
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
+            tachometer=tachometer.parameters(plant),
             array_normal_b=(x, y, z),
         )
 
@@ -222,6 +243,7 @@ class MissionFlight:
         # without a gyro there is no bias to estimate
         rates = gyro.parameters(values[self._gyro.name]) if self._gyro else _NO_GYRO
         field_values = values[self._magnetometer.name] if self._magnetometer else default_values(Magnetometer.table())
+        of_cells, of_gyro, of_field = latencies = self._latencies()
         return Sensors(
             cells=sun_cells.parameters(array),
             earthlit=array.albedo.enabled,
@@ -230,7 +252,28 @@ class MissionFlight:
             magnetometer=magnetometer.parameters(field_values),
             magnetometer_on=_is_on(self._magnetometer, done),
             field_divider=field_values.magnetometer.divider if field_is_heard else 0,
+            late=any(latency.longest_lag(of_one) > 0.0 for of_one in latencies),
+            cell_latency=of_cells,
+            gyro_latency=of_gyro,
+            gyro_since=self._on_since(self._gyro, done),
+            field_latency=of_field,
+            field_since=self._on_since(self._magnetometer, done),
         )
+
+    def _on_since(self, sensor: Node | None, done: list[Event]) -> int:
+        """Step at which a sensor was last switched on; 0: it was on from the first step."""
+        switches = [] if sensor is None else [e for e in done if e.node == sensor.name and e.action != "set"]
+        on, since = True, 0
+        for event in switches:
+            if event.action == "activate" and not on:
+                since = first_step(event, self.mission.period_ns)
+            on = event.action == "activate"
+        return since
+
+    def _latencies(self) -> list[latency.Latency]:
+        """Of cells, gyro and magnetometer."""
+        sensors = (self._array, self._gyro, self._magnetometer)
+        return [latency.NO_LATENCY if node is None else latency.parameters(node.values) for node in sensors]
 
     def _feels_field(self) -> bool:
         plant = self._plant.values

@@ -10,18 +10,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values
-from css_common.vectors import Vec3
 from css_environment import ephemeris
 from css_environment.albedo_vector import PATCHES, earth_light_sources
 from css_environment.earth_light import EarthView, gather_light, look_at_earth, new_earth_view, new_light
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.mission_environment import MissionEnvironment
+from css_environment.orbit import Orbit
 from css_estimation.attitude.flight_references import FlightReferences, References
 from css_estimation.sun import flight_sky
 from css_estimation.sun.flight_sky import FlightSky
+from css_estimation.sun.sun_heading import Sky
 from css_sim.flight_environment import flight_environment
 
 BLOCK_STEPS = 1200
@@ -55,6 +56,8 @@ SKY = np.dtype(
         ("sun_n", np.float64, 3),
         ("solar_flux", np.float64),
         ("illumination", np.float64),
+        ("r_n", np.float64, 3),
+        ("field_n", np.float64, 3),
     ],
     align=True,
 )
@@ -101,11 +104,20 @@ def references_at(table, k: int) -> References:
     )
 
 
-@kernel
-def sky_at(table, k: int) -> tuple[bool, int, Vec3, float, float]:
-    """What the Sun estimator's models say at a step: all of a `Sky` but the light of the Earth."""
+@outer_kernel
+def sky_at(table, light, k: int) -> Sky:
+    """What the Sun estimator's models say at a step, of the tables `sky` and `sky_light`."""
     s = table[min(k, table.shape[0] - 1)]
-    return s.known, s.predicted, (s.sun_n[0], s.sun_n[1], s.sun_n[2]), s.solar_flux, s.illumination
+    return Sky(
+        s.known,
+        s.predicted,
+        (s.sun_n[0], s.sun_n[1], s.sun_n[2]),
+        s.solar_flux,
+        s.illumination,
+        (s.r_n[0], s.r_n[1], s.r_n[2]),
+        (s.field_n[0], s.field_n[1], s.field_n[2]),
+        light[min(k, light.shape[0] - 1)],
+    )
 
 
 @outer_kernel
@@ -158,6 +170,7 @@ class SurroundingsTables:
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
         albedo_model: `albedo_vector.PATCHES`, `VECTOR` or `NADIR`.
+        orbit: the true one, where cases differ in theirs; None: that of the plant.
     """
 
     def __init__(
@@ -169,13 +182,14 @@ class SurroundingsTables:
         own_earth: bool = False,
         field: bool = True,
         albedo_model: int = PATCHES,
+        orbit: Orbit | None = None,
     ) -> None:
-        self._environment: MissionEnvironment = flight_environment(plant, field)
+        self._environment: MissionEnvironment = flight_environment(plant, field, orbit)
         self._sky: FlightSky | None = None if heading is None else flight_sky.flight_sky(heading)
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
-        self._epoch_ns = parse_utc(plant.mission.epoch)
+        self._epoch_ns = mission_epoch(plant.mission)
         self._reflectivity = reflectivity
         self._own_earth = own_earth
         self._albedo_model = albedo_model

@@ -63,6 +63,38 @@ VARIANTS = {
         "mrp_control.reference.acceleration_deg_s2=0.2",
         "mrp_control.reference.known_torque=0.001,0.0,0.0",
     ),
+    "a dispersed orbit, integrated for the truth alone": (
+        "css_array.albedo.draw=per_cell",
+        "dynamics.orbit.model=j2_integrated",
+        "mission.epoch_spread_days=365.0",
+        "dynamics.dispersion.orbit.altitude=500.0",
+        "dynamics.dispersion.orbit.inclination_deg=0.1",
+        "dynamics.dispersion.orbit.raan_deg=10.0",
+        "dynamics.dispersion.orbit.true_anomaly_deg=20.0",
+        "ekf.eclipse.source=model",
+    ),
+    "wheels that rub, and tachometers that do not say all": (
+        RODS,
+        "rods.fitted=true",
+        "mrp_control.dumping.enabled=true",
+        "dynamics.initial.wheel_speed_rpm=20",
+        "dynamics.friction.coulomb=0.0005",
+        "dynamics.friction.viscous=0.00002",
+        "dynamics.dispersion.friction=0.2",
+        "dynamics.tachometer.resolution_rpm=1.0",
+        "dynamics.tachometer.noise_rpm=2.0",
+    ),
+    "late sensors": (
+        "css_array.latency=0.1",
+        "gyro.latency=0.27",
+        "gyro.latency_spread=0.2",
+    ),
+    "clouds that move": (
+        "css_array.albedo.draw=per_cell",
+        "css_array.albedo.drift_m_s=100.0",
+        "css_array.albedo.drift_spread_m_s=20.0",
+        "css_array.albedo.renewal_h=0.02",
+    ),
     "nobody controls": ("graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/ekf",),
     "without albedo, eclipse from the model": ("css_array.albedo.enabled=false", "ekf.eclipse.source=model"),
 }
@@ -107,6 +139,7 @@ RODS_ALONE = {
         "magnetic_control.rate_from=estimator",
         "wls.rate.use_field=true",
     ),
+    "late sensors": ("magnetometer.latency=0.6", "css_array.latency=0.25", "css_array.latency_spread=0.1"),
     "no rest, a field at every cycle": ("magnetometer.divider=1", "magnetic_control.rest_before_measurement=false"),
 }
 

@@ -15,12 +15,13 @@ from css_common.kernel import kernel, outer_kernel
 from css_common.schema import Values, flag, real, reals
 from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, norm, scale, unit, vector_of
 from css_environment.atmosphere import ATMOSPHERE_400_KM, ExponentialAtmosphere, air_velocity, density
-from css_environment.constants import EARTH_MU
 from css_environment.ephemeris import EnvironmentState
+from css_environment.gravity_gradient import gravity_gradient_torque
 
 GRAVITY_GRADIENT = flag("disturbances.gravity_gradient", False, "torque of the Earth's gravity gradient")
 AERODYNAMIC = flag("disturbances.aerodynamic", False, "torque of drag on the panels")
 SOLAR_PRESSURE_ACTS = flag("disturbances.solar_pressure", False, "torque of sunlight on the panels")
+TORQUE = reals("disturbances.torque", (0.0, 0.0, 0.0), "N m", "constant torque in b, of a leak for instance", length=3)
 DIPOLE = reals("disturbances.dipole", (0.0, 0.0, 0.0), "A m^2", "residual magnetic dipole of the spacecraft", length=3)
 _AREAS = reals("panels.areas", (), "m^2", "area of each flat panel; a plate with two sides is two panels", low=0.0)
 _NORMALS = reals("panels.normals", (), "-", "outward unit normals of the panels in b, a row each", columns=3)
@@ -49,6 +50,7 @@ class Disturbances(NamedTuple):
     gravity_gradient: bool = given(GRAVITY_GRADIENT)
     aerodynamic: bool = given(AERODYNAMIC)
     solar_pressure: bool = given(SOLAR_PRESSURE_ACTS)
+    torque_b: Vec3 = made(vector_of, TORQUE)  # [N m]
     dipole_b: Vec3 = made(vector_of, DIPOLE)  # [A m^2]
     atmosphere: ExponentialAtmosphere = made(
         ExponentialAtmosphere,
@@ -101,6 +103,7 @@ def with_dipole(p: Disturbances, dipole_b: Vec3) -> Disturbances:
         p.gravity_gradient,
         p.aerodynamic,
         p.solar_pressure,
+        p.torque_b,
         dipole_b,
         p.atmosphere,
         p.panels,
@@ -108,14 +111,6 @@ def with_dipole(p: Disturbances, dipole_b: Vec3) -> Disturbances:
         p.specular,
         p.diffuse,
     )
-
-
-@kernel
-def gravity_gradient_torque(inertia: Mat3, r_b: Vec3) -> Vec3:
-    """Torque [N m] at the position `r_b` [m] from the centre of the Earth, in b."""
-    r = norm(r_b)
-    u = scale(1.0 / r, r_b)
-    return scale(3.0 * EARTH_MU / (r * r * r), cross(u, multiply(inertia, u)))
 
 
 @kernel
@@ -158,7 +153,7 @@ def disturbance_torque(p: Disturbances, inertia: Mat3, dcm_bn: Mat3, environment
         dcm_bn: attitude.
         environment: what surrounds the spacecraft.
     """
-    torque = (0.0, 0.0, 0.0)
+    torque = p.torque_b
     if p.gravity_gradient:
         torque = add(torque, gravity_gradient_torque(inertia, multiply(dcm_bn, environment.r_n)))
     if p.aerodynamic:

@@ -17,6 +17,7 @@ from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Values, choice, real, reals
 from css_common.sections import INERTIA, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, wheel_axes
 from css_common.vectors import Vec3, vector_of
+from css_sim import wheel_friction
 from css_sim.disturbances import DIPOLE
 from css_sim.rigid_body import RigidBody, RotationState, rigid_body, wheel_momentum_at_speed
 
@@ -81,7 +82,7 @@ class Dispersion(NamedTuple):
 
 WHEEL_SPEEDS = reals("initial.wheel_speed_rpm", (), "rpm", "wheel speeds relative to the body; empty: at rest")
 
-PARAMETERS = (*table_of(InitialConditions), WHEEL_SPEEDS, *table_of(Dispersion))
+PARAMETERS = (*table_of(InitialConditions), WHEEL_SPEEDS, *table_of(Dispersion), *wheel_friction.PARAMETERS)
 parameters = builder(InitialConditions)
 dispersion = builder(Dispersion)
 
@@ -92,6 +93,9 @@ def conflicts(values: Values) -> Iterator[str]:
     if len(speeds) not in ((0, 1, wheels) if wheels else (0,)):
         expected = f"none, 1 or {wheels}" if wheels else "none without wheels"
         yield f"initial.wheel_speed_rpm: {len(speeds)} values given, expected {expected}"
+    coulomb = wheel_friction.parameters(values).coulomb
+    if wheels and coulomb > 0.0 and coulomb >= values[WHEEL_MAX_TORQUE]:
+        yield f"friction.coulomb: {coulomb:g} given, expected less than wheels.max_torque, which would not turn a wheel"
     fastest = np.max(np.abs(speeds), initial=0.0)
     if fastest > values[WHEEL_MAX_SPEED]:
         yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"
@@ -180,4 +184,5 @@ def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBo
     if spread.wheel_torque > 0.0:
         draws = np.array([normal4(key, Stream.WHEEL_LIMIT, 0, i)[0] for i in range(len(torque))])
         torque = torque * np.clip(1.0 + spread.wheel_torque * draws, 0.0, None)
-    return rigid_body(inertia, axes, values[WHEEL_INERTIA], torque, values[WHEEL_MAX_SPEED], substeps)
+    friction = wheel_friction.dispersed_friction(wheel_friction.parameters(values), key, len(axes))
+    return rigid_body(inertia, axes, values[WHEEL_INERTIA], torque, values[WHEEL_MAX_SPEED], substeps, friction)

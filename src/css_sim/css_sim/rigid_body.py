@@ -3,11 +3,12 @@
 
 Equations of motion, with g_i the spin axis of wheel i and h_i = J_i (W_i + g_i.w) its momentum along it:
 
-    [I] w' = -w x ([I] w + sum h_i g_i) - sum u_i g_i + L
-    h_i'   = u_i
+    [I] w' = -w x ([I] w + sum h_i g_i) - sum (u_i + f_i) g_i + L
+    h_i'   = u_i + f_i
     s'     = 1/4 [(1 - s.s) I + 2 [s x] + 2 s s^T] w
 
-W_i is the wheel speed relative to the body, u_i the motor torque on the wheel, L the external torque. [I]
+W_i is the wheel speed relative to the body, u_i the motor torque on the wheel, f_i
+its friction (`wheel_friction`, none unless asked for), L the external torque. [I]
 holds the body and the wheels, but not J_i along the spin axes, which is inside h_i.
 """
 
@@ -20,6 +21,7 @@ from numpy.typing import ArrayLike
 from css_common.attitude import mrp_rate, mrp_shadow
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, add, cross, dot, mat3, multiply, norm, scale, subtract
+from css_sim.wheel_friction import shaft_torque
 
 _RADIANS_PER_RPM = 2.0 * math.pi / 60.0
 # Passes of the speed limit: each shrinks the excess by the ratio of wheel to body inertia.
@@ -36,8 +38,16 @@ MOST_STEPS = 100_000
 """Integration steps in one cycle; whatever needs more is no spacecraft any more."""
 
 
-WHEEL = np.dtype([(name, np.float64) for name in ("gx", "gy", "gz", "inertia", "max_torque", "max_speed")], align=True)
-"""One reaction wheel: unit spin axis in b, spin inertia [kg m2], limits of torque [N m] and speed [rad/s]."""
+WHEEL = np.dtype(
+    [
+        (name, np.float64)
+        for name in ("gx", "gy", "gz", "inertia", "max_torque", "max_speed", "coulomb", "viscous", "response")
+    ],
+    align=True,
+)
+"""One reaction wheel: unit spin axis in b, spin inertia [kg m2], limits of torque [N m] and speed [rad/s], Coulomb
+[N m] and viscous [N m s] friction, and how its speed relative to the body responds to a torque on it [rad/s2/(N m)].
+"""
 
 
 class RigidBody(NamedTuple):
@@ -63,6 +73,7 @@ def rigid_body(
     wheel_max_torque: ArrayLike = 0.030,
     wheel_max_speed_rpm: ArrayLike = 6000.0,
     substeps: int = 1,
+    wheel_friction: tuple[ArrayLike, ArrayLike] = (0.0, 0.0),
 ) -> RigidBody:
     """Build the parameters of `propagate`.
 
@@ -73,6 +84,7 @@ def rigid_body(
         wheel_max_torque: one value or one per wheel [N m].
         wheel_max_speed_rpm: one value or one per wheel [rev/min].
         substeps: least integration steps per call of `propagate`.
+        wheel_friction: Coulomb [N m] and viscous [N m s], each one value or one per wheel.
     """
     matrix = np.asarray(inertia, dtype=np.float64).reshape(3, 3)
     axes = np.asarray(wheel_axes, dtype=np.float64).reshape(-1, 3)
@@ -81,7 +93,11 @@ def rigid_body(
     wheels["inertia"] = wheel_inertia
     wheels["max_torque"] = wheel_max_torque
     wheels["max_speed"] = np.asarray(wheel_max_speed_rpm) * _RADIANS_PER_RPM
-    return RigidBody(_rows(matrix), _rows(np.linalg.inv(matrix)), wheels, int(substeps))
+    inverse = np.linalg.inv(matrix)
+    unit_axes = np.column_stack([wheels["gx"], wheels["gy"], wheels["gz"]])
+    wheels["coulomb"], wheels["viscous"] = wheel_friction
+    wheels["response"] = 1.0 / wheels["inertia"] + np.einsum("ij,jk,ik->i", unit_axes, inverse, unit_axes)
+    return RigidBody(_rows(matrix), _rows(inverse), wheels, int(substeps))
 
 
 def _rows(matrix: np.ndarray) -> Mat3:
@@ -226,12 +242,34 @@ def _near_speed_limit(wheels, omega, wheel_momentum, torque, dt) -> bool:
 
 
 @kernel
-def _cut_at_speed_limit(p, omega, wheel_momentum, torque, dt) -> int:
+def _on_shaft(wheel, omega_bn_b: Vec3, momentum: float, torque: float, dt: float) -> float:
+    """Torque [N m] of motor and friction on a wheel over a step that begins with that body rate and momentum."""
+    if wheel.coulomb == 0.0 and wheel.viscous == 0.0:
+        return torque
+    speed = wheel_speed(wheel, omega_bn_b, momentum)
+    return shaft_torque(wheel.coulomb, wheel.viscous, torque, speed, wheel.response, dt)
+
+
+@kernel
+def _on_shafts(wheels, omega_bn_b: Vec3, wheel_momentum, torque, dt: float) -> Vec3:
+    """Vector sum in b of `_on_shaft` of all wheels."""
+    x, y, z = 0.0, 0.0, 0.0
+    for i in range(torque.shape[0]):
+        on_shaft = _on_shaft(wheels[i], omega_bn_b, wheel_momentum[i], torque[i], dt)
+        x += on_shaft * wheels[i].gx
+        y += on_shaft * wheels[i].gy
+        z += on_shaft * wheels[i].gz
+    return (x, y, z)
+
+
+@kernel
+def _cut_at_speed_limit(p, before, omega, wheel_momentum, torque, dt) -> int:
     """Cut the torque of wheels that pass their speed limit at the end of the step; mask of those wheels."""
     mask = 0
     for i in range(torque.shape[0]):
         wheel = p.wheels[i]
-        speed = wheel_speed(wheel, omega, wheel_momentum[i] + dt * torque[i])
+        on_shaft = _on_shaft(wheel, before, wheel_momentum[i], torque[i], dt)
+        speed = wheel_speed(wheel, omega, wheel_momentum[i] + dt * on_shaft)
         excess = speed - min(max(speed, -wheel.max_speed), wheel.max_speed)
         # a tolerance of rounding only: a wheel held at its limit must not be cut again and again
         if abs(excess) > 1e-12 * wheel.max_speed:
@@ -253,7 +291,7 @@ def propagate(
     dt: float,
     wheel_torque_out,
 ) -> tuple[RotationState, int, int]:
-    """Advance attitude, rate and wheel momenta by `dt` [s] under constant motor and external torques.
+    """Advance attitude, rate and wheel momenta by `dt` [s] under constant motor and external torques, and friction.
 
     A command beyond a wheel's torque limit is cut to it. A torque that would carry a wheel past its speed
     limit by the end of the step is cut so that the wheel ends there, as far as the torque limit allows.
@@ -269,17 +307,18 @@ def propagate(
     """
     torque_limited = _limit_torques(p.wheels, wheel_command, wheel_torque_out)
     h_b = sum_along_axes(p.wheels, wheel_momentum)
-    motor_b = sum_along_axes(p.wheels, wheel_torque_out)
+    before = state.omega_bn_b
+    motor_b = _on_shafts(p.wheels, before, wheel_momentum, wheel_torque_out, dt)
     end = _integrate(p, state, h_b, motor_b, external_torque_b, dt)
     speed_limited = 0
     if _near_speed_limit(p.wheels, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt):
         for _ in range(_LIMIT_PASSES):
-            cut = _cut_at_speed_limit(p, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt)
+            cut = _cut_at_speed_limit(p, before, end.omega_bn_b, wheel_momentum, wheel_torque_out, dt)
             if cut == 0:
                 break
             speed_limited |= cut
-            motor_b = sum_along_axes(p.wheels, wheel_torque_out)
+            motor_b = _on_shafts(p.wheels, before, wheel_momentum, wheel_torque_out, dt)
             end = _integrate(p, state, h_b, motor_b, external_torque_b, dt)
     for i in range(wheel_momentum.shape[0]):
-        wheel_momentum[i] += dt * wheel_torque_out[i]
+        wheel_momentum[i] += dt * _on_shaft(p.wheels[i], before, wheel_momentum[i], wheel_torque_out[i], dt)
     return end, torque_limited, speed_limited

@@ -8,14 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey
 from css_common.vectors import Mat3, Vec3, multiply
 from css_environment.albedo import albedo_output
 from css_environment.ephemeris import EnvironmentState
-from css_sim import gyro, magnetometer, sun_cells
+from css_sim import gyro, latency, magnetometer, sun_cells
 from css_sim.gyro import Gyro, GyroErrors
+from css_sim.latency import Latency, Moment, remember, sensed
 from css_sim.magnetometer import Magnetometer
+from css_sim.rigid_body import RotationState
 from css_sim.sun_cells import SunCells
 
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
@@ -31,6 +34,12 @@ class Sensors(NamedTuple):
     magnetometer: Magnetometer
     magnetometer_on: bool
     field_divider: int  # cycles from one measurement of the field to the next; 0: there is none, or nobody listens
+    late: bool  # some sensor reads what was before its stamp
+    cell_latency: Latency
+    gyro_latency: Latency
+    gyro_since: int  # cycle at which the gyro was switched on
+    field_latency: Latency
+    field_since: int
 
 
 class CellsOfCase(NamedTuple):
@@ -49,6 +58,8 @@ class SensorsOfCase(NamedTuple):
     cells: CellsOfCase
     gyro: GyroErrors
     field_bias_b: Vec3  # [T]
+    lags: Vec3  # [cycles] of cells, gyro and magnetometer
+    history: np.ndarray  # (L,) of latency.MOMENT, written
 
 
 class Readings(NamedTuple):
@@ -95,19 +106,41 @@ def sense_field(p: Magnetometer, bias_b: Vec3, key: RandomKey, step: int, dcm_bn
 
 
 @kernel
+def draw_lags(p: Sensors, key: RandomKey) -> Vec3:
+    """Latencies of one case [cycles]: cells, gyro, magnetometer."""
+    return (
+        latency.draw_lag(p.cell_latency, key, latency.CELLS),
+        latency.draw_lag(p.gyro_latency, key, latency.GYRO),
+        latency.draw_lag(p.field_latency, key, latency.MAGNETOMETER),
+    )
+
+
+@kernel
 def sense(
     p: Sensors,
     case: SensorsOfCase,
     step: int,
     dcm_bn: Mat3,
     sun_b: Vec3,
-    omega_bn_b: Vec3,
+    rotation: RotationState,
     environment: EnvironmentState,
     light,
     voltages_out,
 ) -> Readings:
-    """Readings of all sensors; arguments as of `sense_cells`, and the true body rate [rad/s]."""
+    """Readings of all sensors; arguments as of `sense_cells`, and the true attitude and rate at the stamp."""
     intensity = environment.solar_flux * environment.illumination
+    omega_bn_b, field_n, field_dcm_bn = rotation.omega_bn_b, environment.field_n, dcm_bn
+    if p.late:
+        now = Moment(rotation.sigma_bn, omega_bn_b, environment.sun_n, intensity, field_n)
+        remember(case.history, step, now)
+        if case.lags[0] > 0.0:
+            of_cells = sensed(case.history, step, case.lags[0], now, 0)
+            dcm_bn, intensity = mrp_to_dcm(of_cells.sigma_bn), of_cells.intensity
+            sun_b = multiply(dcm_bn, of_cells.sun_n)
+        omega_bn_b = sensed(case.history, step, case.lags[1], now, p.gyro_since).omega_bn_b
+        if case.lags[2] > 0.0:
+            of_field = sensed(case.history, step, case.lags[2], now, p.field_since)
+            field_dcm_bn, field_n = mrp_to_dcm(of_field.sigma_bn), of_field.field_n
     sense_cells(p.cells, case.cells, case.key, step, dcm_bn, sun_b, intensity, p.earthlit, light, voltages_out)
     bias_b = gyro.bias_at(p.gyro, case.gyro, case.key, step)
     gyro_b, field_b = _NOTHING, _NOTHING
@@ -115,5 +148,5 @@ def sense(
         gyro_b = gyro.read(p.gyro, case.gyro, bias_b, case.key, step, omega_bn_b)
     measured = p.field_divider > 0 and p.magnetometer_on and step % p.field_divider == 0
     if measured:
-        field_b = sense_field(p.magnetometer, case.field_bias_b, case.key, step, dcm_bn, environment.field_n)
+        field_b = sense_field(p.magnetometer, case.field_bias_b, case.key, step, field_dcm_bn, field_n)
     return Readings(gyro_b, p.gyro_on, field_b, measured, bias_b)

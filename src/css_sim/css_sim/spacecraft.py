@@ -37,7 +37,8 @@ def spacecraft(values: Values, key: RandomKey, substeps: int = 1) -> Spacecraft:
         disturbances=torques._replace(dipole_b=dispersed_dipole(values, key)),
         rod_axes_b=np.ascontiguousarray(axes, dtype=np.float64),
         rod_max_dipole=values[ROD_MAX_DIPOLE],
-        disturbed=torques.gravity_gradient or torques.aerodynamic or torques.solar_pressure or has_dipole(values),
+        disturbed=any((torques.gravity_gradient, torques.aerodynamic, torques.solar_pressure, *torques.torque_b))
+        or has_dipole(values),
     )
 
 

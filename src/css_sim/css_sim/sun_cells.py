@@ -21,13 +21,14 @@ from typing import NamedTuple
 
 from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
-from css_common.random_streams import RandomKey, Stream, normal4, uniform4
+from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import choice, flag, integer, real
 from css_common.vectors import Vec3
 from css_environment.albedo import Screen, transmission
 from css_sensors.cells import half_view_cosine
 from css_sim import cell_screen
 from css_sim.cell_faults import apply_faults
+from css_sim.white_noise import add_noise
 
 NOISE = real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0)
 OUTPUT_LOW = real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0)
@@ -92,16 +93,6 @@ def _draw_degradation(p: SunCells, key, step, factors_out) -> None:
 
 
 @kernel
-def _add_noise(sigma, key, step, voltages) -> None:
-    n = voltages.shape[0]
-    for block in range((n + 3) // 4):
-        draws = normal4(key, Stream.CELL_NOISE, step, block)
-        first = 4 * block
-        for j in range(min(4, n - first)):
-            voltages[first + j] += sigma * draws[j]
-
-
-@kernel
 def _limit(p: SunCells, voltages) -> int:
     """Outputs cut to the limits and rounded down as a converter does; mask of those at the top."""
     saturated = 0
@@ -157,7 +148,7 @@ def sample(
             v = warped(v)
         voltages_out[i] = cell.gain * v * voltages_out[i] + cell.bias
     if p.noise > 0.0:
-        _add_noise(p.noise, key, step, voltages_out)
+        add_noise(p.noise, key, Stream.CELL_NOISE, step, voltages_out)
     if faults.shape[0] > 0:
         apply_faults(faults, key, step, voltages_out)
     return _limit(p, voltages_out)

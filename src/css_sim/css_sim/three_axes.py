@@ -28,14 +28,15 @@ def with_noise(sigma: float, key: RandomKey, stream: int, step: int, vector: Vec
 def read_out(resolution: float, limit: float, vector: Vec3) -> Vec3:
     """A vector in steps of `resolution`, each component cut at `limit`; 0: continuous, any."""
     return (
-        _read_out(resolution, limit, vector[0]),
-        _read_out(resolution, limit, vector[1]),
-        _read_out(resolution, limit, vector[2]),
+        read_out_one(resolution, limit, vector[0]),
+        read_out_one(resolution, limit, vector[1]),
+        read_out_one(resolution, limit, vector[2]),
     )
 
 
 @kernel
-def _read_out(resolution: float, limit: float, value: float) -> float:
+def read_out_one(resolution: float, limit: float, value: float) -> float:
+    """A value in steps of `resolution`, cut at `limit`; 0: continuous, any."""
     if resolution > 0.0:
         value = resolution * math.floor(value / resolution + 0.5)
     if limit > 0.0:

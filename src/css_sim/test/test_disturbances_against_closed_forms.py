@@ -13,13 +13,13 @@ from okeefe_spacecraft import okeefe_values
 from css_common.attitude import mrp_to_dcm
 from css_environment.constants import EARTH_MU, EARTH_RADIUS, EARTH_ROTATION_RATE
 from css_environment.ephemeris import EnvironmentState
+from css_environment.gravity_gradient import gravity_gradient_torque
 from css_sim import disturbances
 from css_sim.disturbances import (
     SOLAR_PRESSURE,
     aerodynamic_torque,
     conflicts,
     disturbance_torque,
-    gravity_gradient_torque,
     solar_pressure_torque,
 )
 from css_sim.rigid_body import RotationState, propagate, rigid_body

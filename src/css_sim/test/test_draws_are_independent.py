@@ -12,7 +12,9 @@ from scipy import stats
 
 from css_common.random_streams import Stream, random_key
 from css_common.schema import default_values
-from css_common.sections import MISSION, SPACECRAFT, WHEELS
+from css_common.sections import MISSION, ORBIT, SPACECRAFT, WHEELS
+from css_environment import moving_clouds
+from css_environment.orbit import KeplerianOrbit
 from css_environment.reflectivity import Reflectivity, draw_reflectivity
 from css_sensors.cells import CELLS
 from css_sensors.slits import SLITS
@@ -22,9 +24,13 @@ from css_sim import (
     cell_screen,
     gyro,
     initial_conditions,
+    latency,
     magnetometer,
+    orbit_dispersion,
     slit_timer,
     sun_cells,
+    tachometer,
+    wheel_friction,
 )
 from css_sim.random_walk import random_walk
 
@@ -119,6 +125,26 @@ def slit_draws(key, timer):
         yield from ((f"jitter {step}", float(t)) for t in ticks[:2])
 
 
+def truth_draws(key, plant, grid):
+    orbit = orbit_dispersion.case_orbit(plant, key)
+    assert isinstance(orbit, KeplerianOrbit)
+    yield from (("orbit", x) for x in (orbit.semi_major_axis, orbit.inclination, orbit.raan, orbit.true_anomaly))
+    late = latency.Latency(3.0, 2.0)
+    sensors = (latency.CELLS, latency.GYRO, latency.MAGNETOMETER)
+    yield from (("latency", latency.draw_lag(late, key, sensor)) for sensor in sensors)
+    rubbing = wheel_friction.Friction(1.0, 0.0, 0.1)
+    yield from (("friction", f) for f in wheel_friction.dispersed_friction(rubbing, key, 4)[0])
+    for step in (0, 1):
+        speeds = np.zeros(CELLS_DRAWN)
+        tachometer.report(tachometer.Tachometer(1.0, 0.0), key, step, speeds)
+        yield from ((f"tachometer {step}", s) for s in speeds)
+    motion = moving_clouds.draw_motion(key, 3, 0.0, 1.0, 1.0)
+    yield from (("motion of clouds", m) for m in (motion.drift, motion.phase))
+    (_, later) = moving_clouds.draw_fields(grid, key, moving_clouds.PER_CELL, 1.0, 2)
+    yield from (("clouds to come", g) for g in later.ravel())
+    yield "common clouds to come", moving_clouds.draw_fields(grid, key, moving_clouds.COMMON, 1.0, 2)[1, 0, 0]
+
+
 @pytest.fixture(scope="module")
 def draws():
     """Names of the columns, and what was drawn, (cases, columns)."""
@@ -136,6 +162,10 @@ def draws():
         dispersion__inertia=0.01,
         dispersion__wheel_torque=0.1,
     )
+    plant = okeefe_values(
+        MISSION + ORBIT + orbit_dispersion.PARAMETERS,
+        **{f"dispersion__orbit__{k}": 0.1 for k in ("altitude", "inclination_deg", "raan_deg", "true_anomaly_deg")},
+    )
     conditions = initial_conditions.parameters(start)
     grid = Reflectivity(np.full((2, 3), 0.5), np.full((2, 3), 0.05))
     timer = slit_timer.parameters(default_values(SLITS + slit_timer.PARAMETERS, jitter_us=1e4))
@@ -150,6 +180,7 @@ def draws():
             *start_draws(key, start, conditions),
             *earth_draws(key, grid, np.zeros((2, 3))),
             *slit_draws(key, timer),
+            *truth_draws(key, plant, grid),
         ]
         rows.append([value for _, value in row])
     return [name for name, _ in row], np.array(rows, dtype=float)

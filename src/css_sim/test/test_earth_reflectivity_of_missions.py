@@ -6,6 +6,7 @@ import pytest
 
 from css_common.random_streams import random_key
 from css_common.schema import default_values
+from css_common.sections import MISSION
 from css_environment.reflectivity import HIGHEST, LOWEST
 from css_sim import earth_reflectivity
 
@@ -14,7 +15,7 @@ KEY = random_key(4, 2)
 
 
 def values(**changes):
-    return default_values(earth_reflectivity.PARAMETERS, **{f"albedo__{k}": v for k, v in changes.items()})
+    return default_values(MISSION + earth_reflectivity.PARAMETERS, **{f"albedo__{k}": v for k, v in changes.items()})
 
 
 def reflectivity(key=KEY, **changes):
@@ -58,6 +59,10 @@ def test_grid_of_a_file(tmp_path):
         ({"reflectivity": "file"}, "mean_file: missing"),
         ({"reflectivity": "file", "mean_file": "/nowhere/grid.csv"}, "/nowhere/grid.csv"),
         ({"reflectivity": "knocke", "draw": "common"}, "no standard deviations"),
+        ({"drift_m_s": 10.0}, "albedo.drift_m_s: given with albedo.draw mean"),
+        ({"drift_spread_m_s": 10.0, "draw": "common"}, "albedo.drift_spread_m_s: given with albedo.draw common"),
+        ({"renewal_h": 3.0}, "albedo.renewal_h: given with albedo.draw mean"),
+        ({"renewal_h": 0.001, "draw": "per_cell"}, "albedo.renewal_h: 0.001 given, expected at least 0.00308"),
     ],
 )
 def test_conflicts(changes, message):

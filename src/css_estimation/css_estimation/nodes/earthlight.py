@@ -8,10 +8,9 @@ from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
-from css_common.sensor_inputs import gyro_input
-from css_estimation.messages import attitude_estimate_fields, cells_input, wheels_input
+from css_estimation.messages import attitude_estimate_fields
 from css_estimation.sun.flight_sky import flight_sky, sky_at
-from css_estimation.sun.sun_estimator import aiding_of, hears_wheels
+from css_estimation.sun.sun_estimator import aiding_of, inputs_of
 from css_estimation.sun_filter import earthlight
 from css_msgs.msg import AttitudeEstimate
 
@@ -19,13 +18,12 @@ from css_msgs.msg import AttitudeEstimate
 class Earthlight(Component):
     """Attitude by the Sun filter: the Sun is one direction, the light of the Earth on the cells the other."""
 
-    shared = ("cells", "orbit", "spacecraft", "wheels")
+    shared = ("cells", "orbit", "magnetometer", "spacecraft", "wheels")
     parameters = earthlight.PARAMETERS
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
-        inputs = (cells_input(values), gyro_input(values))
-        return (*inputs, wheels_input(values)) if hears_wheels(values) else inputs
+        return inputs_of(values)
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:

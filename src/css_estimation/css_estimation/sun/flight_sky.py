@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sun, shadow and light of the Earth as the flight's own orbit model has them, for estimators of the Sun.
+"""Sun, shadow, light and field of the Earth as the flight's own orbit model has them, for estimators of the Sun.
 
 The Earth is the filter's own: a mean reflectivity without the clouds of the day.
 """
@@ -7,7 +7,7 @@ The Earth is the filter's own: a mean reflectivity without the clouds of the day
 from typing import NamedTuple
 
 from css_common.declared import given, part, table_of
-from css_common.epochs import parse_utc
+from css_common.epochs import mission_epoch
 from css_common.schema import Values, flag
 from css_common.sections import ORBIT_SOURCE
 from css_environment.mission_environment import MissionEnvironment
@@ -16,6 +16,10 @@ from css_estimation.sun.eclipse_detector import SOURCE
 from css_estimation.sun.sun_heading import PREDICTION_ECLIPSED, PREDICTION_SUNLIT, UNKNOWN_SKY, Sky
 
 USE_ORBIT = flag("use_orbit", True, "use the place in orbit, where the mission has one: shadow and light of the Earth")
+
+USE_FIELD = flag(
+    "use_field", False, "take the measured magnetic field for a direction, where the place in orbit is known"
+)
 
 # Half of the solar disc: the middle of the penumbra.
 _HALF = 0.5
@@ -38,14 +42,15 @@ class FlightSky:
         has_light: the light of the Earth is predicted.
     """
 
-    def __init__(self, values: Values, with_light: bool) -> None:
+    def __init__(self, values: Values, with_light: bool, with_field: bool = False) -> None:
         """Takes sections mission and orbit.
 
         Args:
             with_light: predict the light of the Earth, by the parameters of `MeanEarth`.
+            with_field: predict its magnetic field.
         """
-        self._environment = MissionEnvironment(values, field=False)
-        self._epoch_ns = parse_utc(values.mission.epoch)
+        self._environment = MissionEnvironment(values, field=with_field)
+        self._epoch_ns = mission_epoch(values.mission)
         self.has_light = with_light
         self._predicted = PredictedLight(values) if with_light else None
         self._light = UNKNOWN_SKY.light if self._predicted is None else self._predicted.light
@@ -56,12 +61,15 @@ class FlightSky:
         if self._predicted is not None and e.illumination > 0.0:
             self._predicted.at(e)
         predicted = PREDICTION_ECLIPSED if e.illumination < _HALF else PREDICTION_SUNLIT
-        return Sky(True, predicted, e.sun_n, e.solar_flux, e.illumination, self._light)
+        return Sky(True, predicted, e.sun_n, e.solar_flux, e.illumination, e.r_n, e.field_n, self._light)
 
 
 def flight_sky(values: Values) -> FlightSky | None:
     """The sky that a Sun estimator's values ask for; None when cells decide on eclipse and nobody needs the rest."""
-    return FlightSky(values, _uses_light(values)) if asks_for_sky(values) else None
+    if not asks_for_sky(values):
+        return None
+    with_light = _uses_light(values)
+    return FlightSky(values, with_light, with_light and USE_FIELD in values and values[USE_FIELD])
 
 
 def asks_for_sky(values: Values) -> bool:

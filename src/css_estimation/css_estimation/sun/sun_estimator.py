@@ -12,8 +12,8 @@ from css_common.schema import Values
 from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
-from css_estimation.sun.field_rate import USE_FIELD
-from css_estimation.sun.flight_sky import asks_for_sky, flight_sky, sky_at
+from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
+from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
@@ -26,12 +26,24 @@ _NO_SPEEDS = np.zeros(0)
 
 def hears_field(values: Values) -> bool:
     """Whether an estimator with these values listens to the magnetometer."""
-    return USE_FIELD in values and values[USE_FIELD]
+    return any(parameter in values and values[parameter] for parameter in (RATE_BY_FIELD, USE_FIELD))
 
 
 def hears_wheels(values: Values) -> bool:
     """Whether it listens to the speeds of the wheels."""
     return hasattr(values, "use_wheels") and values.use_wheels and values.wheels.fitted and len(values.wheels.axes) > 0
+
+
+def inputs_of(values: Values) -> tuple[Input, ...]:
+    """Cells, and what else an algorithm with these values listens to."""
+    inputs = [cells_input(values)]
+    if USE_GYRO in values:
+        inputs.append(gyro_input(values))
+    if hears_field(values):
+        inputs.append(field_input(values))
+    if hears_wheels(values):
+        inputs.append(wheels_input(values))
+    return tuple(inputs)
 
 
 def _low_pass_gain(values: Values) -> float:
@@ -65,14 +77,7 @@ class SunEstimator(Component):
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
-        inputs = [cells_input(values)]
-        if USE_GYRO in values:
-            inputs.append(gyro_input(values))
-        if hears_field(values):
-            inputs.append(field_input(values))
-        if hears_wheels(values):
-            inputs.append(wheels_input(values))
-        return tuple(inputs)
+        return inputs_of(values)
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:

@@ -41,10 +41,13 @@ class Sky(NamedTuple):
     sun_n: Vec3  # [-] unit vector to the Sun
     solar_flux: float  # [-] of the Sun in full view, 1 at 1 AU
     illumination: float  # [-] part of the Sun's disc in view
+    r_n: Vec3  # [m] from the centre of the Earth
+    field_n: Vec3  # [T] geomagnetic field; zeros: not predicted
     light: np.ndarray  # (192,) light of the Earth as `css_environment.earth_light.new_light`; zeros: not predicted
 
 
-UNKNOWN_SKY = Sky(False, PREDICTION_UNKNOWN, (1.0, 0.0, 0.0), 1.0, 1.0, new_light())
+_NOTHING: Vec3 = (0.0, 0.0, 0.0)
+UNKNOWN_SKY = Sky(False, PREDICTION_UNKNOWN, (1.0, 0.0, 0.0), 1.0, 1.0, _NOTHING, _NOTHING, new_light())
 """No orbit model."""
 
 

@@ -178,6 +178,7 @@ def read_cells(
             sunlight = flux * max(cosine, p.cos_half_view)
             seen = sunlight > p.earth.largest and v > cell.gain * scale_now * (albedo + 0.5 * sunlight)
             if not seen:
+                likelihood -= 0.5 * (1.0 + math.log(p.errors.noise))
                 continue
         cloud = p.earth.clouds * mean_light
         cloud_state = GAIN + cells + i
@@ -195,6 +196,9 @@ def read_cells(
         factor = cell.gain * (1.0 + x[X_GAIN + i])
         expected = factor * scale_now * output
         if not seen and expected < dark and v < _SURELY_LIT * dark:
+            # no correction, but as good an explanation as that of a filter which has the cell lit
+            squared = (v - expected) * (v - expected) / p.errors.noise
+            likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(p.errors.noise))
             continue
         if not earth_known and not seen and v < p.earth.largest * flux:
             continue
@@ -240,13 +244,14 @@ def read_cells(
             correction[j] += share * innovation
             for k in range(states):
                 covariance[j, k] -= share * gained[k]
-    _correct(x, correction, cells, earth_known)
+    correct(p, x, correction, states)
     return CellReading(nis, dof, used, refused, contrary, likelihood, sigma)
 
 
 @kernel
-def _correct(x, correction, cells: int, earth_known: bool) -> None:
-    """Adds the corrections to an estimate."""
+def correct(p: SunFilterParameters, x, correction, states: int) -> None:
+    """Adds the corrections of the states in use to an estimate."""
+    cells = p.cells.shape[0]
     theta = (correction[0], correction[1], correction[2])
     length = norm(theta)
     if length > _LONGEST:
@@ -257,7 +262,7 @@ def _correct(x, correction, cells: int, earth_known: bool) -> None:
     x[X_SCALE] += correction[SCALE]
     for i in range(cells):
         x[X_GAIN + i] += correction[GAIN + i]
-    if earth_known:
+    if states > GAIN + cells:
         x[X_EARTH] = max(_LEAST_EARTH, x[X_EARTH] + correction[EARTH])
         for i in range(cells):
             x[X_GAIN + cells + i] += correction[GAIN + cells + i]

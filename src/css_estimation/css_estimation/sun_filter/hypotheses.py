@@ -31,7 +31,7 @@ from css_estimation.sun_filter.motion import begin_rate
 from css_estimation.sun_filter.options import SunFilterParameters
 
 # Outputs of one cycle to the next are alike in what the model has wrong: so much of each is news.
-_NEWS = 0.1
+_NEWS = 0.05
 # Logarithm of the weight, relative to the best, at which a hypothesis is given up.
 _GIVEN_UP = -12.0
 # Two hypotheses this near [rad] are one.

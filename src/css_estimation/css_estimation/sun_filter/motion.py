@@ -13,7 +13,8 @@ import math
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY, scaled, skew, sum_of
-from css_common.vectors import Mat3, Vec3, matmul, multiply, scale, subtract, transpose
+from css_common.vectors import Mat3, Vec3, add, dot, matmul, multiply, scale, subtract, transpose
+from css_environment.gravity_gradient import gravity_gradient_torque
 from css_estimation.sun.sun_heading import Aiding
 from css_estimation.sun.sun_tracking import is_body_rate
 from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, dcm_of, forget, set_dcm, triple
@@ -122,10 +123,13 @@ def change_rate(p: Motion, before: int, after: int, omega_bn_b: Vec3, wheels_b: 
 
 
 @kernel
-def go_on(p: Motion, model: int, gyro_b: Vec3, wheels_b: Vec3, dt: float, states: int, x, covariance) -> Vec3:
+def go_on(
+    p: Motion, model: int, gyro_b: Vec3, wheels_b: Vec3, r_n: Vec3, dt: float, states: int, x, covariance
+) -> Vec3:
     """Attitude, rate and their covariance after `dt` [s]; gives the body rate [rad/s].
 
     Args:
+        r_n: place [m] where gravity turns the body; zeros when it is not known, or the attitude is not.
         states: how many of the states are in use.
     """
     dcm_bn = dcm_of(x)
@@ -146,6 +150,8 @@ def go_on(p: Motion, model: int, gyro_b: Vec3, wheels_b: Vec3, dt: float, states
         gyroscopic = scaled(dt, matmul(skew(momentum_b), inverse))
         kept = matmul(turn, sum_of(IDENTITY, gyroscopic))
         by_rate = scaled(dt, matmul(transpose(dcm_bn), inverse))
+        if p.gravity_gradient and model == RATE_BY_MOMENTUM and dot(r_n, r_n) > 0.0:
+            momentum_b = add(momentum_b, scale(dt, gravity_gradient_torque(p.inertia, multiply(dcm_bn, r_n))))
         x[X_RATE], x[X_RATE + 1], x[X_RATE + 2] = multiply(turn, momentum_b)
         attitude_noise = 0.0
         rate_noise = p.acceleration * dt

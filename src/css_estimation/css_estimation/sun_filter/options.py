@@ -14,6 +14,7 @@ from css_common.vectors import Mat3, mat3
 from css_environment.albedo import Screen, plane_screen
 from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import EclipseParameters
+from css_estimation.sun.flight_sky import USE_FIELD
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
 from css_sensors.cells import half_view_cosine, plane_sides
 
@@ -225,6 +226,9 @@ class Motion(NamedTuple):
         lambda rate: math.radians(rate) ** 2,
         real("rate.start_deg_s", 2.0, "deg/s", "rate of a body that nothing is known of, 1 sigma", low=0.0, high=100.0),
     )
+    gravity_gradient: bool = given(
+        flag("rate.gravity_gradient", False, "reckon with the torque of gravity, once the attitude is known")
+    )
     torque: float = made(  # [(N m)2 s]
         lambda torque, time: torque * torque * time,
         real("rate.torque", 1e-6, "N m", "unknown torque on the body, 1 sigma", low=0.0, high=100.0),
@@ -239,6 +243,27 @@ class Motion(NamedTuple):
             "change of the rate within a second where neither gyro nor momentum tells it, 1 sigma",
             low=0.0,
             high=100.0,
+        ),
+    )
+
+
+class Field(NamedTuple):
+    """Of the magnetic field as a measurement."""
+
+    use_field: bool = given(USE_FIELD)
+    noise: float = made(  # [T2]
+        lambda sigma: (1e-9 * sigma) ** 2,
+        real("field.noise_nt", 100.0, "nT", "white noise of the magnetometer per axis, 1 sigma", low=0.0, high=1e5),
+    )
+    lasting: float = made(  # [T2]
+        lambda sigma: (1e-9 * sigma) ** 2,
+        real(
+            "field.error_nt",
+            300.0,
+            "nT",
+            "lasting error of magnetometer and model per axis, 1 sigma",
+            low=1.0,
+            high=1e5,
         ),
     )
 
@@ -287,6 +312,7 @@ class SunFilterParameters(NamedTuple):
     errors: CellErrors = part(CellErrors)
     earth: EarthErrors = part(EarthErrors)
     motion: Motion = part(Motion)
+    field: Field = part(Field)
     convergence: Convergence = part(Convergence)
     eclipse: EclipseParameters = part(EclipseParameters)
 

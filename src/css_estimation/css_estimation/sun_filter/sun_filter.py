@@ -43,6 +43,7 @@ from css_estimation.sun.sun_tracking import elapsed
 from css_estimation.sun_filter import options
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
+from css_estimation.sun_filter.field_update import field_usable, read_field
 from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, weigh
 from css_estimation.sun_filter.memory import (
     DEAD,
@@ -98,6 +99,7 @@ _SLOWEST_GAIN = 0.05
 _FIRST_NOISE, _FIRST_TIME = 0.1, 3.0  # [-], [s]
 _CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told to fade
 _NO_RATE: Vec3 = (0.0, 0.0, 0.0)
+_NOWHERE: Vec3 = (0.0, 0.0, 0.0)
 
 PARAMETERS = options.PARAMETERS
 conflicts = options.conflicts
@@ -309,14 +311,15 @@ def _track(
     states = GAIN + (2 * cells if earth_known else cells)
     faded, use = before.faded, cycle.lit
     best, left = 0, 1
-    reading, raw_b = NOTHING_READ, _NO_RATE
+    r_n = aiding.sky.r_n if earth_known else _NOWHERE
+    reading, raw_b, use_field = NOTHING_READ, _NO_RATE, False
     for k in range(HYPOTHESES):
         if memory.weights[k] <= DEAD:
             continue
         x, covariance = memory.estimates[k], memory.covariances[k]
         if cycle.model != state.rate.model:
             change_rate(p.motion, state.rate.model, cycle.model, state.rate.raw_b, cycle.wheels_b, x, covariance)
-        omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, dt, states, x, covariance)
+        omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, r_n, dt, states, x, covariance)
         _forget_slowly(p, dt, norm(omega_b), states, x, covariance)
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
@@ -349,6 +352,14 @@ def _track(
             weigh(memory, k, read.likelihood)
             if k == best:
                 reading = read
+    if earth_known and field_usable(p, aiding):
+        for k in range(HYPOTHESES):
+            if memory.weights[k] > DEAD:
+                x, covariance = memory.estimates[k], memory.covariances[k]
+                field = read_field(p, aiding.field_b, aiding.sky.field_n, states, x, covariance, memory)
+                weigh(memory, k, field.likelihood)
+        use_field = True
+    if use or use_field:
         best, left = give_up(memory)
     progress, mode = _progress(p, before, memory, best, left, cycle, use, faded, reading, voltages, aiding)
     return progress, _filtered_rate(p, state.rate, cycle, raw_b), reading, mode
@@ -387,8 +398,11 @@ def _progress(
         return _AFRESH, mode
     if contrary > _CONTRARY_SHARE:
         contrary = 0.0
-    converged = stage == _STAGE_HEADING and since > _SHORTEST_CONVERGENCE
-    if use and aiding.sky.known and converged and sigma * sigma < p.convergence.roll_variance:
+    # the field tells the turn at once, whatever the Earth
+    told = field_usable(p, aiding)
+    enough = p.convergence.search_variance if told else p.convergence.roll_variance
+    converged = stage == _STAGE_HEADING and (told or since > _SHORTEST_CONVERGENCE) and sigma * sigma < enough
+    if use and aiding.sky.known and converged:
         look_for_roll(p, memory, sun_n)
         stage, since = _STAGE_ROLL, 0.0
     return Progress(stage, True, since, contrary, faded), mode

@@ -72,6 +72,9 @@ _DEFINITIONS = (
     "from the first light on: the same with the search for the Sun",
     "NEES: mean over the whole flight, eclipse included, across the Sun line, for each of two degrees of freedom",
     "NIS: normalised innovations squared for each degree of freedom, over the steps that had some",
+    "harder truth: any date of a year; an orbit integrated under J2, its elements off by 100 m and 0.02 to 0.05 deg, "
+    "that the filter takes for one that drifts evenly; clouds alike over 15 deg that drift by 10 m/s and have become "
+    "others in 12 h; readings of cells and gyro one cycle old; wheels that rub, speeds in steps of 1 rpm",
     "NEES below its range: error bars too wide, as in eclipse without gyro for a torque that this truth does not have",
 )
 

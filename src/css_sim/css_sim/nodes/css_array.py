@@ -19,9 +19,11 @@ from css_environment.albedo_vector import MODELS, earth_light_sources
 from css_environment.earth_light import new_earth_view, new_light
 from css_environment.earth_rotation import advance_dcm_en, dcm_en_at
 from css_environment.ephemeris import segment_start
+from css_environment.moving_clouds import CLOUD_STEP_NS, reflect
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_sensors.cells import LARGEST_READING, NORMALS, SMALLEST_READING
-from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, sun_cells
+from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, latency, sun_cells
+from css_sim.delayed import Delayed
 from css_sim.sensing import CellsOfCase, sense_cells
 from css_sim.sensor_checks import LOUDEST_CELL, noise_findings
 from css_sim.sun_cells import NOISE, OUTPUT_HIGH, OUTPUT_LOW
@@ -37,6 +39,7 @@ class CssArray(Component):
         *cell_errors.PARAMETERS,
         *cell_screen.PARAMETERS,
         *earth_reflectivity.PARAMETERS,
+        *latency.PARAMETERS,
     )
 
     @classmethod
@@ -57,6 +60,7 @@ class CssArray(Component):
         yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
         yield from earth_reflectivity.conflicts(values)
+        yield from latency.conflicts(values)
         if values[OUTPUT_LOW] >= values[OUTPUT_HIGH]:
             yield f"output_low: {values[OUTPUT_LOW]:g} given, expected less than output_high"
         # estimators would take for missing what these cells put out
@@ -82,6 +86,12 @@ class CssArray(Component):
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
         light = earth_reflectivity.parameters(values)
         self._earthlit, self._albedo_model = light.enabled, MODELS[light.model]
+        self._clouds = earth_reflectivity.clouds(values, grid if light.enabled else None)
+        self._cloud_step = -1
+        if self._clouds.moving:
+            self._cloud_motion, self._cloud_fields = earth_reflectivity.case_clouds(values, grid, self._key)
+        self._reflect = typed_call(reflect)
+        self._delayed = Delayed(latency.parameters(values), self._key, latency.CELLS)
         self._view, self._light = new_earth_view(), new_light()
         self._segment_s = -1.0
         self._to_dcm, self._turn = typed_call(mrp_to_dcm), typed_call(multiply)
@@ -95,10 +105,15 @@ class CssArray(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
-        dcm_bn = self._to_dcm(vector_of(truth.sigma_bn))
-        sun_n = vector_of(truth.sun_n)
+        sigma_bn, sun_n = vector_of(truth.sigma_bn), vector_of(truth.sun_n)
+        intensity = truth.solar_flux * truth.illumination
+        step = self.step_of(stamp_ns)
+        of_sun = self._delayed(step, sigma_bn=sigma_bn, sun_n=sun_n, intensity=intensity)
+        dcm_bn = self._to_dcm(of_sun.sigma_bn)
         if self._earthlit:
             dcm_en = self._earth_attitude((stamp_ns - self.epoch_ns) * 1e-9)
+            if self._clouds.moving:
+                self._move_clouds(stamp_ns - self.epoch_ns)
             self._sources(
                 self._albedo_model,
                 self._view,
@@ -114,15 +129,20 @@ class CssArray(Component):
             self._p,
             self._cells,
             self._key,
-            self.step_of(stamp_ns),
+            step,
             dcm_bn,
-            self._turn(dcm_bn, sun_n),
-            truth.solar_flux * truth.illumination,
+            self._turn(dcm_bn, of_sun.sun_n),
+            of_sun.intensity,
             self._earthlit,
             self._light,
             voltages,
         )
         return {"voltages": self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)}
+
+    def _move_clouds(self, elapsed_ns: int) -> None:
+        if elapsed_ns // CLOUD_STEP_NS != self._cloud_step:
+            self._cloud_step = elapsed_ns // CLOUD_STEP_NS
+            self._reflect(self._clouds, self._cloud_motion, self._cloud_fields, elapsed_ns, self._reflectivity)
 
     def _earth_attitude(self, elapsed_s: float) -> Mat3:
         """Rotation from n to the Earth-fixed frame, in the same segments and so the same digits as the ephemeris."""

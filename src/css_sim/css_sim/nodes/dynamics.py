@@ -26,7 +26,7 @@ from css_common.sections import (
     needed_of_wheels,
 )
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
-from css_sim import disturbances, flight_environment, initial_conditions
+from css_sim import disturbances, flight_environment, initial_conditions, orbit_dispersion, tachometer
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
@@ -43,8 +43,10 @@ class Dynamics(Plant):
     shared = ("orbit", "spacecraft", "wheels", "rods", "lockstep")
     parameters = (
         *initial_conditions.PARAMETERS,
+        *orbit_dispersion.PARAMETERS,
         *flight_environment.PARAMETERS,
         *disturbances.PARAMETERS,
+        *tachometer.PARAMETERS,
         _SUBSTEPS,
         _POSE,
     )
@@ -75,6 +77,8 @@ class Dynamics(Plant):
         outputs = [Output("truth", "truth", SpacecraftState, frame=INERTIAL)]
         if values[WHEELS_FITTED]:
             outputs.append(Output("wheels", "wheels/state", WheelState))
+            if tachometer.errs(tachometer.parameters(values)):
+                outputs.append(Output("true_wheels", "truth/wheels", WheelState))
         if values[_POSE]:
             outputs.append(Output("pose", "truth/pose", PoseStamped, frame=INERTIAL))
         return tuple(outputs)
@@ -87,6 +91,7 @@ class Dynamics(Plant):
     def conflicts(cls, values: Values) -> Iterable[str]:
         yield from disturbances.conflicts(values)
         yield from initial_conditions.conflicts(values)
+        yield from orbit_dispersion.conflicts(values)
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
@@ -98,9 +103,11 @@ class Dynamics(Plant):
 
     def configure(self) -> None:
         values = self.values
-        key = random_key(values[SEED], values[CASE])
+        self._key = key = random_key(values[SEED], values[CASE])
         self._craft = spacecraft(values, key, values[_SUBSTEPS])
-        self._environment = flight_environment.flight_environment(values)
+        self._environment = flight_environment.flight_environment(
+            values, orbit=orbit_dispersion.case_orbit(values, key)
+        )
         self._state = initial_conditions.initial_state(initial_conditions.parameters(values), key)
         self._momentum = initial_conditions.initial_wheel_momentum(
             self._craft.body, self._state.omega_bn_b, values[initial_conditions.WHEEL_SPEEDS]
@@ -108,7 +115,9 @@ class Dynamics(Plant):
         self._wheels_at_rest = np.zeros(len(self._momentum))
         self._rods_at_rest = np.zeros(len(self._craft.rod_axes_b))
         self._torque = np.zeros(len(self._momentum))
+        self._tachometer = tachometer.parameters(values)
         self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
+        self._report = typed_call(tachometer.report)
         self._steps = round(values[DURATION] / values[PERIOD])
         self.finished = False
 
@@ -153,14 +162,15 @@ class Dynamics(Plant):
         if self.values[WHEELS_FITTED]:
             speed = np.zeros(len(self._momentum))
             self._wheel_speeds(self._craft.body, state.omega_bn_b, self._momentum, speed)
-            messages["wheels"] = self.message(
-                "wheels",
-                stamp_ns,
-                speed_limited=speed_limited,
-                speed=speed,
-                torque_limited=torque_limited,
-                torque=self._torque.copy(),
-            )
+            wheels = {
+                "speed_limited": speed_limited,
+                "torque_limited": torque_limited,
+                "torque": self._torque.copy(),
+            }
+            if tachometer.errs(self._tachometer):
+                messages["true_wheels"] = self.message("true_wheels", stamp_ns, speed=speed.copy(), **wheels)
+                self._report(self._tachometer, self._key, self.step_of(stamp_ns), speed)
+            messages["wheels"] = self.message("wheels", stamp_ns, speed=speed, **wheels)
         if self.values[_POSE]:
             # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
             # dcm_bn in the convention of css_common.attitude

@@ -13,8 +13,10 @@ from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import CASE, SEED
+from css_common.vectors import vector_of
 from css_msgs.msg import SpacecraftState
-from css_sim import gyro
+from css_sim import gyro, latency
+from css_sim.delayed import Delayed
 from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -26,7 +28,7 @@ class Gyro(Component):
     """Body rates with bias and noise. Deactivated, it says for every stamp that it has no estimate (covariance -1)."""
 
     shared = ()
-    parameters = gyro.PARAMETERS
+    parameters = (*gyro.PARAMETERS, *latency.PARAMETERS)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -37,6 +39,10 @@ class Gyro(Component):
         return (Output("imu", "gyro/imu", Imu),)
 
     @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        return latency.conflicts(values)
+
+    @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return noise_findings(gyro.NOISE, node.values, LOUDEST_GYRO_DEG_S)
 
@@ -45,11 +51,13 @@ class Gyro(Component):
         self._p = gyro.parameters(self.values)
         self._errors = gyro.draw_errors(self._p, self._key)
         self._measure = typed_call(gyro.measure)
+        self._delayed = Delayed(latency.parameters(self.values), self._key, latency.GYRO)
         self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        x, y, z = received["truth"].omega_bn_b.tolist()
-        rate = self._measure(self._p, self._errors, self._key, self.step_of(stamp_ns), (x, y, z))
+        step = self.step_of(stamp_ns)
+        omega_bn_b = self._delayed(step, omega_bn_b=vector_of(received["truth"].omega_bn_b)).omega_bn_b
+        rate = self._measure(self._p, self._errors, self._key, step, omega_bn_b)
         return self._imu(stamp_ns, np.array(rate), self._covariance)
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:

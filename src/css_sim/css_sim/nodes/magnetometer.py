@@ -7,14 +7,18 @@ import numpy as np
 from sensor_msgs.msg import MagneticField
 
 from css_common.attitude import mrp_to_dcm
+from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import CASE, FIELD_DIVIDER, SEED
+from css_common.vectors import vector_of
 from css_msgs.msg import SpacecraftState
-from css_sim import magnetometer
+from css_sim import latency, magnetometer
+from css_sim.delayed import Delayed
+from css_sim.latency import Moment
 from css_sim.sensing import sense_field
 from css_sim.sensor_checks import LOUDEST_FIELD_NT, noise_findings
 
@@ -28,7 +32,7 @@ class Magnetometer(Component):
     """
 
     shared = ("magnetometer",)
-    parameters = magnetometer.PARAMETERS
+    parameters = (*magnetometer.PARAMETERS, *latency.PARAMETERS)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -39,6 +43,10 @@ class Magnetometer(Component):
         return (Output("field", "mag/field", MagneticField, divider=values[FIELD_DIVIDER]),)
 
     @classmethod
+    def conflicts(cls, values: Values) -> Iterable[str]:
+        return latency.conflicts(values)
+
+    @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return noise_findings(magnetometer.NOISE, node.values, LOUDEST_FIELD_NT)
 
@@ -46,17 +54,19 @@ class Magnetometer(Component):
         self._key = random_key(self.values[SEED], self.values[CASE])
         self._p = magnetometer.parameters(self.values)
         self._bias_b = magnetometer.draw_bias(self._p, self._key)
+        self._delayed = Delayed(latency.parameters(self.values), self._key, latency.MAGNETOMETER)
         self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         step = self.step_of(stamp_ns)
+        there = self._there(step, received["truth"])
         if not self._is_due(step):
             return {}
-        truth = received["truth"]
-        s1, s2, s3 = truth.sigma_bn.tolist()
-        x, y, z = truth.field_n.tolist()
-        measured = sense_field(self._p, self._bias_b, self._key, step, mrp_to_dcm((s1, s2, s3)), (x, y, z))
+        measured = sense_field(self._p, self._bias_b, self._key, step, mrp_to_dcm(there.sigma_bn), there.field_n)
         return self._field(stamp_ns, np.array(measured), self._covariance)
+
+    def _there(self, step: int, truth: Sample) -> Moment:
+        return self._delayed(step, sigma_bn=vector_of(truth.sigma_bn), field_n=vector_of(truth.field_n))
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
         return self._field(stamp_ns, np.zeros(3), _NOTHING) if self._is_due(self.step_of(stamp_ns)) else {}
