@@ -44,7 +44,14 @@ def now_and_then(text: str) -> Callable[[int, str, float], str]:
 @pytest.mark.parametrize(
     ("text", "kind"),
     # the import takes fill values out; what no cell can read and is none goes on the wire
-    [("", "missing"), ("nan", "missing"), ("-9999", "missing"), ("65535", "missing"), ("-500", "impossible")],
+    [
+        ("", "missing"),
+        ("nan", "missing"),
+        ("-9999", "missing"),
+        ("65535", "missing"),
+        ("-500", "impossible"),
+        ("3", "impossible"),
+    ],
 )
 def test_a_cell_that_is_missing_now_and_then_costs_neither_line_nor_accuracy(tmp_path, text, kind):
     result = replayed(recording(tmp_path, now_and_then(text)), "ekf", "wls:gate=0")
@@ -69,10 +76,10 @@ def test_a_cell_that_is_always_missing_leaves_open_what_it_alone_sees(tmp_path):
     _, nees = tangent_nees(result.log, "ekf")
     sigma_deg = np.degrees(np.sqrt(result.log.estimates["ekf"].covariance[:, [0, 4, 8]].sum(axis=1)))
     # the Sun is on +x first: that face alone would tell, and the filter says so
-    assert errors[0] > 50.0 and np.all(sigma_deg[:15] > 60.0)
+    assert errors[0] > 50.0 and np.all(sigma_deg[:4] > 60.0)
     assert nees.max() < 2.0
-    # the gyro turns what the others see into what is missing
-    assert errors[30:].max() < 0.1
+    # the gyro turns what the others see into what is missing, a cell that the Sun only grazes among them
+    assert errors[10:].max() < 0.1
     for name in ("wls_gate_0", "wls_gate_0_use_dark_cells_true"):
         estimates = result.log.estimates[name]
         known = estimates.covariance[:, 0] >= 0.0

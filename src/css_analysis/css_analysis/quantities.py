@@ -360,13 +360,14 @@ _REST = (
     Quantity(
         "nees_mean",
         "",
-        "mean normalised error squared across the Sun line for each degree of freedom, 1 if consistent",
+        "normalised error squared across the Sun line over the two axes, 1 if consistent: mean over the samples of the "
+        "whole flight that have an error bar, before acquisition and in the dark too",
         tally=_mean("nees_sum", "consistencies", each=2),
     ),
     Quantity(
         "nis_mean",
         "",
-        "mean normalised innovation squared for each degree of freedom, 1 if consistent",
+        "normalised innovation squared over its degrees of freedom, 1 if consistent: mean over all steps with one",
         tally=_mean("nis_sum", "innovations"),
     ),
     Quantity(

@@ -68,8 +68,8 @@ class SunFilterFlight:
             outputs = outputs + part * albedo
         return outputs + self.white * self.dice.normal(size=len(outputs))
 
-    def step(self, *, gyro=False, part=1.0, wheels=True, change=None):
-        """One cycle; `change` is done to the outputs."""
+    def step(self, *, gyro=False, part=1.0, predicted=None, wheels=True, change=None):
+        """One cycle; `predicted` is the part of the Sun's disc by the orbit, `change` is done to the outputs."""
         omega = np.array(self.omega)
         for _ in range(4):
             middle = matmul(rotation_vector_to_dcm(tuple(0.125 * DT * omega)), self.dcm_bn)
@@ -85,7 +85,7 @@ class SunFilterFlight:
             gyro_valid=gyro,
             wheel_speeds=np.linalg.lstsq(axes.T, self.wheels_b, rcond=None)[0],
             wheels_valid=wheels,
-            sky=self.sky._replace(illumination=part),
+            sky=self.sky._replace(illumination=part if predicted is None else predicted),
         )
         if self.field_n is not None:
             aiding = aiding._replace(

@@ -201,6 +201,28 @@ def test_one_dead_reading_costs_one_cell(kind, options):
     assert np.dot(heading.sun_b, SUN_B) > math.cos(math.radians(60.0))
 
 
+@pytest.mark.parametrize("kind", KINDS, ids=executable)
+def test_cells_are_left_out_one_by_one(kind):
+    """A cell that is missing (NaN), or brighter than Sun and Earth can make it, costs itself and nothing else."""
+    count = next(n for n in (8, *layouts(kind)) if n in layouts(kind))
+    normals = np.reshape(layouts(kind)[count]["cells__normals"], (-1, 3))
+    for i in range(count):
+        came_to = {}
+        for fault in (math.nan, 2.5, 16.0, math.inf):
+            p, state, memory = build(kind, count, cells__field_of_view_deg=180.0)
+            voltages = np.maximum(normals @ SUN_B, 0.0)
+            voltages[i] = fault
+            for _ in range(60):
+                state, heading = kind.algorithm.step(p, state, memory, 0.1, voltages, predicting(PREDICTION_SUNLIT))
+            assert_sane(heading)
+            assert heading.lit_mask >> i & 1 == 0, f"cell {i} at {fault}"
+            assert heading.validity == VALIDITY_VALID, f"cell {i} at {fault}"
+            came_to[fault] = heading.sun_b
+        # the Sun filter has its own bounds: what it does not take for a reading it may still look at, to refuse it
+        for fault in came_to if kind.algorithm is not sun_filter else ():
+            assert came_to[fault] == came_to[math.nan], f"cell {i} at {fault}"
+
+
 def takes(kind: Any, count: int) -> bool:
     return count in layouts(kind)
 

@@ -149,6 +149,24 @@ def test_dusk_is_no_turn(known):
     assert np.mean(dawn) < 0.5
 
 
+@pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
+def test_dusk_before_its_time_is_no_turn(gyro):
+    """A place that is 90 km wrong makes the model 12 s late."""
+    for seed in range(3):
+        flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, seed, white=0.002, earth=(0.3, 0.9, 0.2))
+        flight.fly(200.0, gyro=gyro)
+        assert flight.error_deg(flight.step(gyro=gyro)) < 0.6
+        for part in np.concatenate([np.linspace(1.0, 0.0, 82), np.zeros(40)]):
+            heading = flight.step(part=float(part), predicted=1.0, gyro=gyro)
+        assert heading.validity == VALIDITY_HELD
+        assert flight.error_deg(heading) < 1.0
+        heading = flight.fly(60.0, part=0.0, gyro=gyro)
+        for part in np.linspace(0.0, 1.0, 82):
+            heading = flight.step(part=float(part), predicted=1.0, gyro=gyro)
+        assert flight.error_deg(heading) < 1.0
+        assert flight.error_deg(flight.fly(30.0, gyro=gyro)) < 0.5
+
+
 def test_in_the_dark_a_change_of_the_wheels_is_a_change_of_the_rate():
     flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
     flight.fly(200.0)

@@ -152,7 +152,7 @@ def test_cells_used_are_the_predicted_and_the_bright_ones():
     predicted_b = (0.0, 0.0, 1.0)  # all four cells of the +z side
     voltages = np.array([0.7, 0.7, 0.7, 0.0, 0.1, 0.5, 0.27, 0.29])
     prior = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
-    s, cov, nis, count, mask = sunline_ekf.update_cells(p, predicted_b, prior, voltages, 0.7)
+    s, cov, nis, count, mask = sunline_ekf.update_cells(p, predicted_b, prior, voltages, 0)
     # cell 3 is predicted lit and dark, cell 5 is above 0.4 of the brightest, 7 is above it by 0.01
     assert mask == 0b10101111
     assert count == 6

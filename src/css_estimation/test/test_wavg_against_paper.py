@@ -17,6 +17,7 @@ from css_common.vectors import angle_between
 from css_estimation.sun import wavg
 from css_estimation.sun.cell_layout import brightest, cell_layout
 from css_estimation.sun.snapshot import MODE_NO_SUN
+from css_estimation.sun.sun_heading import UNAIDED
 from css_sensors.cells import CELLS
 
 
@@ -194,3 +195,48 @@ def test_layout_of_the_mission_is_the_dual_pyramid():
     layout = cell_layout(okeefe_values(CELLS))
     np.testing.assert_allclose(np.abs(layout.cells["nz"]), math.sqrt(0.5), rtol=1e-12)
     assert layout.cos_half_view == pytest.approx(0.5)
+
+
+def one_cell(theta_deg, azimuth=0.3, scale=1.0):
+    """Heading of cell 0 alone with the Sun at an angle to its normal, on any side."""
+    p = wavg.parameters(okeefe_values(CELLS + wavg.PARAMETERS))
+    voltages = np.zeros(8)
+    voltages[0] = scale * math.cos(math.radians(theta_deg))
+    _, heading = wavg.step(p, wavg.initial_state(p), None, 0.1, voltages, UNAIDED)
+    n = np.array(heading.sun_b)
+    across = np.cross(n, (0.0, 1.0, 0.0))
+    across /= np.linalg.norm(across)
+    t = math.radians(theta_deg)
+    side = math.cos(azimuth) * across + math.sin(azimuth) * np.cross(n, across)
+    return heading, math.cos(t) * n + math.sin(t) * side, n
+
+
+@pytest.mark.parametrize("theta_deg", [5.0, 20.0, 40.0, 59.0])
+def test_one_cell_gives_the_measure_of_its_error(theta_deg):
+    """The output is the cosine of the error: NEES of each axis is 1 on average, less by the cell's own error."""
+    heading, _, n = one_cell(theta_deg)
+    covariance = np.array(heading.covariance).reshape(3, 3)
+    squared = []
+    for azimuth in np.arange(12) * math.pi / 6.0:
+        error = one_cell(theta_deg, azimuth)[1] - n
+        error -= n * (n @ error)
+        squared.append(error @ np.linalg.pinv(covariance - n[:, None] * n * (n @ covariance @ n), rcond=1e-9) @ error)
+    exact = math.sin(math.radians(theta_deg)) ** 2
+    assumed = 1.0 - max(0.5, math.cos(math.radians(theta_deg)) - 0.1) ** 2
+    assert np.mean(squared) / 2.0 == pytest.approx(exact / assumed, rel=1e-6)
+    assert exact <= assumed
+
+
+def test_the_measure_knows_the_view_and_no_more_than_the_sun():
+    """A dim cell is at the edge of its view, a bright one is not better than its own error."""
+    edge = one_cell(59.9, scale=0.5)[0].covariance
+    assert sum(edge[::4]) == pytest.approx(0.75 + 0.5 * 0.75**2, rel=1e-9), "sin^2 of 60 deg"
+    facing = sum(one_cell(0.0)[0].covariance[::4])
+    assert facing == pytest.approx(0.19 + 0.5 * 0.19**2, rel=1e-9), "sin^2 of acos(0.9)"
+    assert sum(one_cell(0.0, scale=1.3)[0].covariance[::4]) == facing
+
+
+def test_an_average_of_several_cells_has_no_measure():
+    p = wavg.parameters(okeefe_values(CELLS + wavg.PARAMETERS))
+    _, heading = wavg.step(p, wavg.initial_state(p), None, 0.1, np.array([0.7, 0.6, 0, 0, 0, 0, 0, 0.0]), UNAIDED)
+    assert heading.covariance[0] == -1.0

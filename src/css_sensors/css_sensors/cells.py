@@ -34,7 +34,7 @@ SMALLEST_READING = real(
     "cells.smallest_reading", -10.0, "-", "an output below it is no reading: the cell is missing", high=0.0
 )
 LARGEST_READING = real(
-    "cells.largest_reading", 10.0, "-", "an output above it is no reading: the cell is missing", low=0.0
+    "cells.largest_reading", 2.0, "-", "an output above it is no reading: the cell is missing", low=0.0
 )
 
 CELLS: Table = (

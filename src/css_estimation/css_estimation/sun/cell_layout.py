@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The coarse sun sensor cells as an estimator knows them: normals, view cone, hidden half space."""
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -8,10 +9,15 @@ import numpy as np
 from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
+from css_estimation.symmetric import Symmetric, product
 from css_sensors.cells import IN_PLANE, half_view_cosine, plane_sides
 
-# Beyond it a number is no reading of a cell, and its square would overflow.
-READABLE = 1e100
+READABLE = 2.0
+"""From it on a number is no reading of a cell, 1 being the Sun at normal incidence.
+
+No place gives a cell more than 2/sqrt(3) = 1.155 of the Sun's flux, 1.034 of the normal one at most: that is Sun and
+white, diffuse Earth that fills the other half of the sky together, at the best angles of both. The rest is for cells
+that are not calibrated."""
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side")], align=True)
 """One cell: outward unit normal in b, and its component along the clip normal; 0: the cell is not clipped."""
@@ -51,6 +57,21 @@ def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
 
 
 @kernel
+def share_view(layout: CellLayout, i: int, mask: int) -> bool:
+    """Whether there are directions that cell `i` sees in common with each cell in `mask`, taken one by one."""
+    cell = layout.cells[i]
+    half = max(layout.cos_half_view, 0.0)
+    # cosine of the whole view: normals further apart have cones without a common direction
+    apart = 2.0 * half * half - 1.0 + IN_PLANE
+    for j in range(layout.cells.shape[0]):
+        if mask >> j & 1:
+            other = layout.cells[j]
+            if cell.nx * other.nx + cell.ny * other.ny + cell.nz * other.nz <= apart or cell.side * other.side < 0.0:
+                return False
+    return True
+
+
+@kernel
 def brightest(voltages) -> int:
     """Index of the largest readable output; -1 when none is above zero."""
     index = -1
@@ -65,10 +86,10 @@ def brightest(voltages) -> int:
 
 @kernel
 def missing_cells(voltages) -> int:
-    """Mask of the outputs that are missing (NaN)."""
+    """Mask of the outputs that are missing: NaN, or what no cell reads."""
     mask = 0
     for i in range(voltages.shape[0]):
-        if voltages[i] != voltages[i]:
+        if not -READABLE < voltages[i] < READABLE:
             mask |= 1 << i
     return mask
 
@@ -85,12 +106,35 @@ def is_opposed(layout: CellLayout, i: int, mask: int) -> bool:
 
 
 @kernel
-def informs(layout: CellLayout, i: int, output: float, level: float, predicted_b: Vec3, missing: int) -> bool:
+def informs(
+    layout: CellLayout, i: int, output: float, level: float, lit: bool, predicted_b: Vec3, margin: float, missing: int
+) -> bool:
     """Whether a filter that expects the Sun in the unit direction `predicted_b` takes the output of cell `i`.
 
     A cell above `level` sees the Sun, and one that should see it says where the Sun is not, unless the cell that looks
-    the other way is in `missing` (result of `missing_cells`).
+    the other way is in `missing` (result of `missing_cells`). One that is `lit` below that level sees the Sun if the
+    prediction allows it: what it knows is the Sun's cosine on the cell, with an error of `margin`.
     """
-    if not (-READABLE < output < READABLE and (output > level or sees(layout, i, predicted_b))):
+    if not -READABLE < output < READABLE:
         return False
-    return not (missing != 0 and output <= level and is_opposed(layout, i, missing))
+    if output > level:
+        return True
+    if sees(layout, i, predicted_b):
+        return not (missing != 0 and is_opposed(layout, i, missing))
+    return lit and cosine_on(layout, i, predicted_b) > layout.cos_half_view - margin
+
+
+@kernel
+def cosine_on(layout: CellLayout, i: int, direction_b: Vec3) -> float:
+    """Cosine of the angle between a unit vector and the normal of cell `i`."""
+    cell = layout.cells[i]
+    return cell.nx * direction_b[0] + cell.ny * direction_b[1] + cell.nz * direction_b[2]
+
+
+@kernel
+def view_margin(layout: CellLayout, i: int, covariance: Symmetric) -> float:
+    """Largest error of the Sun's cosine on cell `i` that a direction with this covariance leaves, 3 sigma."""
+    cell = layout.cells[i]
+    n = (cell.nx, cell.ny, cell.nz)
+    p = product(covariance, n)
+    return 3.0 * math.sqrt(max(0.0, n[0] * p[0] + n[1] * p[1] + n[2] * p[2]))

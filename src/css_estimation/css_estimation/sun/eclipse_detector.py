@@ -17,6 +17,7 @@ from css_estimation.sun.sun_heading import (
     ECLIPSE_SUNLIT,
     PREDICTION_ECLIPSED,
     PREDICTION_UNKNOWN,
+    Sky,
 )
 
 _SOURCES = {"sensors": 0, "model": 1, "both": 2}
@@ -54,6 +55,12 @@ class EclipseState(NamedTuple):
 def initial_state() -> EclipseState:
     """Sunlit until the cells have been dark for long enough."""
     return EclipseState(ECLIPSE_SUNLIT, 0.0)
+
+
+@kernel
+def goes_by_model(p: EclipseParameters, sky: Sky) -> bool:
+    """Whether the orbit model alone has the word, and there is one."""
+    return p.source == _MODEL and sky.known
 
 
 @kernel

@@ -143,7 +143,7 @@ def least_squares(p: LeastSquaresParameters, voltages, top: int) -> Snapshot:
     """
     cells = p.snapshot.layout.cells
     none = Snapshot((0.0, 0.0, 0.0), NO_COVARIANCE, 0, MODE_NO_SUN)
-    lit, mask = lit_cells(p.snapshot.gate, voltages, top)
+    lit, mask = lit_cells(p.snapshot.layout, p.snapshot.gate, voltages, top)
     if not lit:
         return none
     if mask == 0:

@@ -74,5 +74,5 @@ def finish_safe_hold(
         sun_b = state.sun_b
     valid = mode != MODE_NO_SUN and not in_shadow
     restarted = switched or state.validity != VALIDITY_VALID
-    estimate = Estimate(sun_b, NO_COVARIANCE, valid, in_shadow, restarted, 0.0, 0, mask, mode)
+    estimate = Estimate(sun_b, NO_COVARIANCE, valid, in_shadow, restarted, 0.0, 0, mask, mode, state.light)
     return finish_cycle(p, state, dt, aiding, gyro_usable(p, aiding), shadow, estimate)

@@ -9,8 +9,9 @@ from css_common.schema import flag
 from css_common.vectors import Vec3
 from css_estimation.sun.cell_layout import CellLayout, cell_layout
 from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.fading import UNKNOWN_TURN, LightNow, light_on
 from css_estimation.sun.lit_cells import Gate
-from css_estimation.sun.sun_heading import VALIDITY_NONE, VALIDITY_VALID, Aiding, Covariance, SunHeading
+from css_estimation.sun.sun_heading import NO_COVARIANCE, VALIDITY_NONE, VALIDITY_VALID, Aiding, Covariance, SunHeading
 from css_estimation.sun.sun_tracking import (
     Estimate,
     TrackingParameters,
@@ -19,6 +20,7 @@ from css_estimation.sun.sun_tracking import (
     finish_cycle,
     gyro_usable,
     turned_sun,
+    watch_light,
 )
 
 MODE_NO_SUN = 0
@@ -52,7 +54,7 @@ def finish_snapshot(
     aiding: Aiding,
     snapshot: Snapshot,
 ) -> tuple[TrackingState, SunHeading]:
-    """The rest of a cycle: without a Sun the last heading is held, or turned with the gyro.
+    """The rest of a cycle: without a Sun, and while it sets, the last heading is held, or turned with the gyro.
 
     Args:
         top: result of `brightest`.
@@ -60,14 +62,23 @@ def finish_snapshot(
     """
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, aiding)
-    valid = snapshot.mode != MODE_NO_SUN
+    lit = snapshot.mode != MODE_NO_SUN
+    mask = snapshot.lit_mask
+    # one cell alone dims by a turn as by a Sun that sets, and gives no rate by either
+    several = mask & (mask - 1) != 0
+    share = UNKNOWN_TURN if several else 0.0
+    light = LightNow(light_on(p.layout, snapshot.sun_b, voltages, mask) if lit else 0.0, share)
+    track, setting = watch_light(p.tracking, state, dt, aiding, lit, light)
+    valid = lit and not setting
     sun_b = snapshot.sun_b
     if not valid and state.validity != VALIDITY_NONE:
         sun_b = state.sun_b
         if p.propagate_held and gyro_ok:
             sun_b = turned_sun(sun_b, aiding.gyro_b, dt)
     restarted = state.validity != VALIDITY_VALID
-    estimate = Estimate(sun_b, snapshot.covariance, valid, False, restarted, 0.0, 0, snapshot.lit_mask, snapshot.mode)
+    mode = snapshot.mode if valid else MODE_NO_SUN
+    covariance = snapshot.covariance if valid else NO_COVARIANCE
+    estimate = Estimate(sun_b, covariance, valid, False, restarted, 0.0, 0, mask if valid else 0, mode, track)
     largest = voltages[top] if top >= 0 else 0.0
     shadow = detect_eclipse(p.tracking.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
     return finish_cycle(p.tracking, state, dt, aiding, gyro_ok, shadow, estimate)

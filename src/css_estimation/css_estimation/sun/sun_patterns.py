@@ -42,7 +42,7 @@ def _masks(layout: CellLayout, gate: Gate, sphere, voltages, masks_out) -> None:
         for i in range(voltages.shape[0]):
             cell = layout.cells[i]
             voltages[i] = cell.nx * s[0] + cell.ny * s[1] + cell.nz * s[2] if sees(layout, i, s) else 0.0
-        masks_out[k] = lit_cells(gate, voltages, brightest(voltages))[1]
+        masks_out[k] = lit_cells(layout, gate, voltages, brightest(voltages))[1]
 
 
 def sun_patterns(layout: CellLayout, gate: Gate) -> np.ndarray:

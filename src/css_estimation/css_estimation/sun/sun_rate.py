@@ -8,6 +8,8 @@ from css_common.vectors import Vec3, cross, dot, norm
 
 # Below this sine the two directions are one, and their cross product has no direction.
 _SAME_DIRECTION = 1e-12
+# A shorter time [s] is none to divide by: the quotient overflows.
+_SHORTEST = 1e-30
 
 
 @kernel
@@ -27,7 +29,7 @@ def rate_from_sun_vectors(sun_b: Vec3, previous_sun_b: Vec3, dt: float, limit: f
     sine = norm(axis)
     if not (dt > 0.0 and sine > _SAME_DIRECTION):
         return (0.0, 0.0, 0.0)
-    k = math.atan2(sine, dot(sun_b, previous_sun_b)) / (sine * dt)
+    k = math.atan2(sine, dot(sun_b, previous_sun_b)) / (sine * max(dt, _SHORTEST))
     return (
         min(max(k * axis[0], -limit), limit),
         min(max(k * axis[1], -limit), limit),

@@ -10,7 +10,7 @@ the time constant of the filter. Where the magnetic field is measured and may be
 leave open (`field_rate`). Two vectors make a pair only when cells gave both in successive cycles; the
 vector from before an eclipse, or from before an estimator started anew, is never half of one. Without gyro
 or field and without a pair there is no information: the filter holds, or decays to zero, and the rate source
-says so.
+says so. Vectors of a Sun that sets make no pair, and what they made before it was noticed is not held (`fading`).
 """
 
 import math
@@ -21,8 +21,9 @@ from css_common.declared import builder, given, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import choice, flag, real
 from css_common.vectors import Vec3, multiply, scale, unit
-from css_estimation.sun import eclipse_detector, field_rate
-from css_estimation.sun.eclipse_detector import EclipseParameters, EclipseState
+from css_estimation.sun import eclipse_detector, fading, field_rate
+from css_estimation.sun.eclipse_detector import EclipseParameters, EclipseState, goes_by_model
+from css_estimation.sun.fading import LightNow, LightTrack, follow_light, in_the_dark
 from css_estimation.sun.field_rate import (
     FieldRateParameters,
     FieldTrack,
@@ -84,6 +85,7 @@ class TrackingState(NamedTuple):
     rate_source: int
     field: FieldTrack
     eclipse: EclipseState
+    light: LightTrack
 
 
 class Estimate(NamedTuple):
@@ -98,13 +100,21 @@ class Estimate(NamedTuple):
     nis_dof: int
     lit_mask: int
     mode: int
+    light: LightTrack
 
 
 def initial_state() -> TrackingState:
     """No estimate yet, filter at rest."""
     zero = (0.0, 0.0, 0.0)
     return TrackingState(
-        zero, zero, 0.0, VALIDITY_NONE, RATE_NONE, field_rate.initial_state(), eclipse_detector.initial_state()
+        zero,
+        zero,
+        0.0,
+        VALIDITY_NONE,
+        RATE_NONE,
+        field_rate.initial_state(),
+        eclipse_detector.initial_state(),
+        fading.initial_track(),
     )
 
 
@@ -131,6 +141,25 @@ def gyro_usable(p: TrackingParameters, aiding: Aiding) -> bool:
 def turned_sun(sun_b: Vec3, omega_bn_b: Vec3, dt: float) -> Vec3:
     """Components in b of an inertially fixed direction after `dt` [s] at constant rate [rad/s]."""
     return unit(multiply(rotation_vector_to_dcm(scale(dt, omega_bn_b)), sun_b))
+
+
+@kernel
+def watch_light(
+    p: TrackingParameters, state: TrackingState, dt: float, aiding: Aiding, lit: bool, now: LightNow
+) -> tuple[LightTrack, bool]:
+    """The track of the light, and whether the Sun is setting: no cell's output is to be taken for a direction.
+
+    Args:
+        lit: cells see a Sun, setting or not.
+        now: what the estimator can tell of the light.
+    """
+    if not lit:
+        return in_the_dark(state.light, gyro_usable(p, aiding)), False
+    if goes_by_model(p.eclipse, aiding.sky):
+        # of the light the model alone says whether all of the Sun is in view
+        setting = aiding.sky.illumination < 1.0
+        return LightTrack(1.0, 1.0 if setting else 0.0, 0.0), setting
+    return follow_light(state.light, dt, now)
 
 
 @kernel
@@ -196,7 +225,8 @@ def finish_with_rate(
     elif p.field.use_field and (change.known or field.age >= 0.0):
         field, omega_bn_b = filter_without_sun(p.field, field, change, omega_bn_b, p.rate_limit)
         rate_source = RATE_FIELD
-    elif not p.hold_rate:
+    elif not p.hold_rate or estimate.light.before > 0.0:
+        # what successive vectors showed of a Sun that set was its setting
         omega_bn_b = low_pass(omega_bn_b, (0.0, 0.0, 0.0), gain)
 
     validity = state.validity
@@ -208,7 +238,9 @@ def finish_with_rate(
         validity = VALIDITY_HELD
     age = 0.0 if estimate.valid or validity == VALIDITY_NONE else state.age + dt
 
-    new_state = TrackingState(estimate.sun_b, omega_bn_b, age, validity, rate_source, field, eclipse_state)
+    new_state = TrackingState(
+        estimate.sun_b, omega_bn_b, age, validity, rate_source, field, eclipse_state, estimate.light
+    )
     heading = SunHeading(
         estimate.sun_b,
         estimate.covariance,

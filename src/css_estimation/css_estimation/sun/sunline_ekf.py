@@ -6,7 +6,8 @@ form.
 
 Which cells enter decides whether the filter works. Used are the cells that the propagated estimate puts in
 the Sun's view, whatever they read (a dark one says where the Sun is not), and those brighter than a gate
-relative to the brightest. A cell in neither class may be lit by the Earth alone, and is left out.
+relative to the brightest. A cell below the gate may be lit by the Earth alone; where its field of view lets it read so
+little of the Sun (`lit_cells`), it is used if the Sun may be in its view within the error of the prediction.
 
 Missing cells (NaN). A dark cell by itself says that the Sun is not in front of it; that it is just beside takes a cell
 that looks the other way and is dark too. Where that one is missing, the dark one is left out.
@@ -16,8 +17,9 @@ covariance is told so: tangent variance stays, variance along the Sun line becom
 there, e^2/2, whose second moment is trace^2/2. Far from convergence the filter so stays the linear one that
 finds the Sun from anywhere; once converged it is consistent on the two axes that exist.
 
-Darkness. Without light the filter only propagates. Without gyro too, nothing is known about the motion: a
-larger process noise says so, and a state less certain than a fresh one is replaced at the next light.
+Darkness. Without light, and with that of a Sun that sets (`fading`), the filter only propagates. Without gyro too,
+nothing is known about the motion: a larger process noise says so, and a state less certain than a fresh one is replaced
+at the next light.
 
 Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 tracking, 3 propagating with a
 measured rate, 4 propagating without one.
@@ -32,9 +34,10 @@ from css_common.kernel import kernel
 from css_common.schema import Values, choice, real
 from css_common.vectors import Vec3
 from css_estimation.sun import sun_tracking
-from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout, informs, missing_cells
+from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout, informs, missing_cells, view_margin
 from css_estimation.sun.eclipse_detector import detect_eclipse
-from css_estimation.sun.lit_cells import CELL_SIGMA, Gate
+from css_estimation.sun.fading import KNOWN_TURN, LightNow, cells_that_see, light_on, tells_light
+from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
@@ -45,6 +48,7 @@ from css_estimation.sun.sun_tracking import (
     elapsed,
     finish_cycle,
     gyro_usable,
+    watch_light,
 )
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.sun.wavg import weighted_average
@@ -56,9 +60,17 @@ MODE_TRACKING = 2
 MODE_PROPAGATING = 3
 MODE_COASTING = 4
 
-# A reading above twice the normal Sun is a fault: it must not throw the state to where rounding rules.
-_LARGEST_READING = 2.0
 
+_GATE = real(
+    "gate",
+    0.4,
+    "-",
+    "share of the brightest cell above which a cell is used",
+    low=0.0,
+    high=1.0,
+    tunable=True,
+)
+_MINIMUM = real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True)
 
 _PROCESS_SIGMA = real(
     "process_sigma", 0.01, "rad/sqrt(s)", "drift of the Sun line, 1 sigma", low=0.0, high=10.0, tunable=True
@@ -69,18 +81,8 @@ class EkfParameters(NamedTuple):
     """Variances in rad^2, process noise in rad^2/s."""
 
     layout: CellLayout = computed(cell_layout)
-    gate: Gate = made(
-        lambda level, minimum: Gate(True, level, minimum),
-        real(
-            "gate",
-            0.4,
-            "-",
-            "share of the brightest cell above which a cell is used",
-            low=0.0,
-            high=1.0,
-            tunable=True,
-        ),
-        real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True),
+    gate: Gate = computed(
+        lambda values: Gate(True, values[_GATE], values[_MINIMUM], dimmest_output(values)), _GATE, _MINIMUM, DIM_CELLS
     )
     cell_variance: float = made(square, CELL_SIGMA)
     process_noise: float = made(square, _PROCESS_SIGMA)
@@ -143,25 +145,29 @@ def initial_state(p: EkfParameters) -> EkfState:
 
 @kernel
 def update_cells(
-    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, largest: float
+    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, top: int
 ) -> tuple[Vec3, Symmetric, float, int, int]:
     """Updates with every cell that the propagated `sun_b` or the gate selects.
+
+    Args:
+        top: result of `brightest`, which sees the Sun.
 
     Returns:
         state (not yet of unit length), covariance, NIS, its degrees of freedom, mask of the cells used.
     """
     cells = p.layout.cells
-    level = p.gate.level * largest
-    predicted_b = sun_b
+    level = p.gate.level * voltages[top]
+    _, lit_mask = lit_cells(p.layout, p.gate, voltages, top)
+    predicted_b, predicted_covariance = sun_b, covariance
     nis = 0.0
     mask = 0
     count = 0
     missing = missing_cells(voltages)
     for i in range(voltages.shape[0]):
         v = voltages[i]
-        if not informs(p.layout, i, v, level, predicted_b, missing):
+        margin = view_margin(p.layout, i, predicted_covariance)
+        if not informs(p.layout, i, v, level, lit_mask >> i & 1 == 1, predicted_b, margin, missing):
             continue
-        v = min(max(v, -_LARGEST_READING), _LARGEST_READING)
         normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
         sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, p.cell_variance)
         nis += q
@@ -196,6 +202,11 @@ def step(
         noise = p.process_noise if rate_known else p.process_noise_without_rate
         sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
 
+    sure = started and tells_light(tracking.light, trace(covariance))
+    light = light_on(p.layout, sun_b, voltages, cells_that_see(p.layout, sun_b)) if sure else 0.0
+    track, setting = watch_light(p.tracking, tracking, dt, aiding, lit, LightNow(light, KNOWN_TURN))
+    lit = lit and not setting
+
     mode = MODE_PROPAGATING if rate_known else MODE_COASTING
     restarted = False
     nis = 0.0
@@ -212,7 +223,7 @@ def step(
                 started = restarted = True
     predicted_b = sun_b
     if lit and started:
-        sun_b, covariance, nis, count, mask = update_cells(p, sun_b, covariance, voltages, largest)
+        sun_b, covariance, nis, count, mask = update_cells(p, sun_b, covariance, voltages, top)
     if started:
         sun_b, covariance = constrain(sun_b, predicted_b, covariance, p.largest_variance)
     else:
@@ -228,6 +239,7 @@ def step(
         count,
         mask,
         mode,
+        track,
     )
     shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, aiding.sky.predicted)
     tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)

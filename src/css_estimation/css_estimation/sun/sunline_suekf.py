@@ -27,7 +27,8 @@ from css_common.kernel import kernel
 from css_common.schema import real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, unit
 from css_estimation.sun import unscented_cycle
-from css_estimation.sun.cell_layout import informs, missing_cells
+from css_estimation.sun.cell_layout import informs, missing_cells, view_margin
+from css_estimation.sun.lit_cells import scale_of
 from css_estimation.sun.square_root import add_vector
 from css_estimation.sun.sun_heading import Aiding, SunHeading
 from css_estimation.sun.sun_tracking import turned_sun
@@ -47,10 +48,10 @@ from css_estimation.sun.unscented_cycle import (
     UnscentedParameters,
     UnscentedState,
     close_cycle,
+    direction_covariance,
     direction_of,
     is_sound,
     open_cycle,
-    reading_of,
     start,
     sure_rate,
     turn_points,
@@ -136,15 +137,13 @@ def switch_axis(axis: int, memory: UnscentedMemory) -> int:
 
 
 @kernel
-def predict(
-    p: SunlineSuekfParameters, cycle: Cycle, axis: int, aiding: Aiding, memory: UnscentedMemory
-) -> tuple[bool, int]:
+def predict(p: SunlineSuekfParameters, cycle: Cycle, axis: int, memory: UnscentedMemory) -> tuple[bool, int]:
     """Moves the estimate on; gives whether it is not lost, and the axis from here on."""
     f, x = p.filter, memory.x
     axis = switch_axis(axis, memory)
     draw_points(f.points, memory)
     if cycle.steered:
-        turn_points(aiding.gyro_b, cycle.dt, memory)
+        turn_points(cycle.rate_b, cycle.dt, memory)
     else:
         for i in range(POINTS):
             move_point(memory.points[i], axis, cycle.dt)
@@ -152,8 +151,8 @@ def predict(
     sound = gather_points(f.points, (q, q, q, r, r, light), memory) and _normalise(memory)
     if cycle.steered:
         s2, s3 = rate_axes(direction_of(memory), axis)
-        x[3], x[4] = dot(aiding.gyro_b, s2), dot(aiding.gyro_b, s3)
-        sure_rate(memory.root, _RATES, f.rate_noise)
+        x[3], x[4] = dot(cycle.rate_b, s2), dot(cycle.rate_b, s3)
+        sure_rate(memory.root, _RATES, cycle.rate_variance)
     return sound and is_sound(f, x[_LIGHT], memory), axis
 
 
@@ -178,13 +177,16 @@ def measure(p: UnscentedParameters, cycle: Cycle, voltages, memory: UnscentedMem
     """
     cells, points = p.layout.cells, memory.points
     predicted_b = direction_of(memory)
-    missing = missing_cells(voltages)
-    level = p.gate.level * cycle.largest if p.gate.relative else p.gate.level
+    missing, covariance = missing_cells(voltages), direction_covariance(memory)
+    level = p.gate.level * scale_of(p.gate, cycle.largest)
     count = mask = 0
     for i in range(voltages.shape[0]):
-        if not informs(p.layout, i, voltages[i], level, predicted_b, missing):
+        lit = cycle.lit_mask >> i & 1 == 1
+        if not informs(
+            p.layout, i, voltages[i], level, lit, predicted_b, view_margin(p.layout, i, covariance), missing
+        ):
             continue
-        memory.readings[count] = reading_of(voltages[i])
+        memory.readings[count] = voltages[i]
         for j in range(POINTS):
             d = (points[j, 0], points[j, 1], points[j, 2])
             cosine = dot((cells[i].nx, cells[i].ny, cells[i].nz), unit(d))
@@ -214,10 +216,10 @@ def step(
 ) -> tuple[UnscentedState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     f = p.filter
-    cycle = open_cycle(f, state, dt, voltages, aiding)
+    cycle = open_cycle(f, state, dt, voltages, aiding, memory)
     started, axis = cycle.started, state.axis
     if started:
-        started, axis = predict(p, cycle, axis, aiding, memory)
+        started, axis = predict(p, cycle, axis, memory)
     restarted = False
     nis, count, mask = 0.0, 0, 0
     if cycle.lit:

@@ -27,7 +27,6 @@ from css_estimation.sun.unscented_cycle import (
     direction_of,
     is_sound,
     open_cycle,
-    reading_of,
     start,
     sure_rate,
     turn_points,
@@ -73,12 +72,12 @@ def _rate(memory: UnscentedMemory) -> Vec3:
 
 
 @kernel
-def predict(p: UnscentedParameters, cycle: Cycle, aiding: Aiding, memory: UnscentedMemory) -> bool:
+def predict(p: UnscentedParameters, cycle: Cycle, memory: UnscentedMemory) -> bool:
     """Moves the estimate on; False when it is lost."""
     length = norm(direction_of(memory))
     draw_points(p.points, memory)
     if cycle.steered:
-        turn_points(aiding.gyro_b, cycle.dt, memory)
+        turn_points(cycle.rate_b, cycle.dt, memory)
     else:
         for i in range(POINTS):
             move_point(memory.points[i], cycle.dt)
@@ -89,8 +88,8 @@ def predict(p: UnscentedParameters, cycle: Cycle, aiding: Aiding, memory: Unscen
         for a in range(3):
             memory.x[a] *= k
     if cycle.steered:
-        memory.x[3], memory.x[4], memory.x[5] = cross(direction_of(memory), aiding.gyro_b)
-        sure_rate(memory.root, _RATES, p.rate_noise)
+        memory.x[3], memory.x[4], memory.x[5] = cross(direction_of(memory), cycle.rate_b)
+        sure_rate(memory.root, _RATES, cycle.rate_variance)
     return sound and is_sound(p, norm(direction_of(memory)), memory)
 
 
@@ -101,7 +100,7 @@ def measure(p: UnscentedParameters, lit_mask: int, voltages, memory: UnscentedMe
     count = 0
     for i in range(voltages.shape[0]):
         if lit_mask >> i & 1:
-            memory.readings[count] = reading_of(voltages[i])
+            memory.readings[count] = voltages[i]
             for j in range(POINTS):
                 memory.outputs[j, count] = (
                     cells[i].nx * points[j, 0] + cells[i].ny * points[j, 1] + cells[i].nz * points[j, 2]
@@ -129,8 +128,8 @@ def step(
 ) -> tuple[UnscentedState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     f = p.filter
-    cycle = open_cycle(f, state, dt, voltages, aiding)
-    started = cycle.started and predict(f, cycle, aiding, memory)
+    cycle = open_cycle(f, state, dt, voltages, aiding, memory)
+    started = cycle.started and predict(f, cycle, memory)
     restarted = False
     nis, count, mask = 0.0, 0, 0
     if cycle.lit:

@@ -2,7 +2,8 @@
 """What the two unscented Sun filters share: parameters, start, darkness, loss, and what they report.
 
 Both carry six states of which the first three are along the Sun, and the next ones its motion. Light of the cells alone
-moves them; a gyro, while it delivers, turns the heading in the dark.
+moves them; a gyro, while it delivers, turns the heading in the dark. While the Sun sets (`fading`) the heading is held,
+and without a gyro it is lost in the dark that follows.
 
 A heading less certain than a fresh one is lost, as is a filter that has no covariance any more, or that nobody called
 for long: the last heading is held, turned by what rate is known, until light starts the filter anew.
@@ -23,6 +24,7 @@ from css_common.vectors import Vec3, dot, multiply, scale, unit
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout
 from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.fading import KNOWN_TURN, LightNow, LightTrack, cells_that_see, light_on, tells_light
 from css_estimation.sun.lit_cells import CELL_SIGMA, Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.square_root import set_diagonal
@@ -35,6 +37,7 @@ from css_estimation.sun.sun_tracking import (
     finish_with_rate,
     gyro_usable,
     turned_sun,
+    watch_light,
 )
 from css_estimation.sun.sunline_filter import constrain
 from css_estimation.sun.unscented import POINTS, STATES, PointParameters, UnscentedMemory
@@ -47,9 +50,6 @@ MODE_TRACKING = 2
 MODE_PROPAGATING = 3
 MODE_COASTING = 4
 MODE_LOST = 5
-
-# A reading above twice the normal Sun is a fault: it must not throw the state to where rounding rules.
-_LARGEST_READING = 2.0
 
 # A light shorter or longer by this factor than the normal Sun's is none.
 _LIGHT_RANGE = 10.0
@@ -114,7 +114,10 @@ class Cycle(NamedTuple):
     lit: bool  # cells see the Sun
     lit_mask: int  # which
     started: bool  # there is an estimate to go on with
-    steered: bool  # in the dark, by the gyro
+    steered: bool  # by the rate that follows: in the dark by the gyro, while the Sun sets without one by none
+    rate_b: Vec3  # [rad/s]
+    rate_variance: float  # [rad^2/s^2]
+    light: LightTrack
 
 
 class Outcome(NamedTuple):
@@ -154,20 +157,31 @@ def heading_gain(values: Values) -> float:
 
 
 @kernel
-def open_cycle(p: UnscentedParameters, state: UnscentedState, dt: float, voltages, aiding: Aiding) -> Cycle:
+def open_cycle(
+    p: UnscentedParameters, state: UnscentedState, dt: float, voltages, aiding: Aiding, memory: UnscentedMemory
+) -> Cycle:
     """The part before the filter's own; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
     gyro_ok = gyro_usable(p.tracking, aiding)
     top = brightest(voltages)
-    _, mask = lit_cells(p.gate, voltages, top)
+    _, mask = lit_cells(p.layout, p.gate, voltages, top)
     started = state.started and dt <= p.longest_step
-    return Cycle(dt, gyro_ok, top, voltages[top] if top >= 0 else 0.0, mask != 0, mask, started, gyro_ok and mask == 0)
-
-
-@kernel
-def reading_of(output: float) -> float:
-    """A cell's output within what one can be."""
-    return min(max(output, -_LARGEST_READING), _LARGEST_READING)
+    tracking = state.tracking
+    light = 0.0
+    if started and tells_light(tracking.light, trace(direction_covariance(memory))):
+        sun_b = turned_sun(tracking.sun_b, aiding.gyro_b if gyro_ok else tracking.omega_bn_b, dt)
+        light = light_on(p.layout, sun_b, voltages, cells_that_see(p.layout, sun_b))
+    track, setting = watch_light(p.tracking, tracking, dt, aiding, mask != 0, LightNow(light, KNOWN_TURN))
+    if setting:
+        mask = 0
+    elif mask == 0 and track.before > 0.0 and not gyro_ok:
+        # the motion was last seen before the Sun began to set
+        started = False
+    largest = voltages[top] if top >= 0 else 0.0
+    rate = aiding.gyro_b if gyro_ok else (0.0, 0.0, 0.0)
+    rate_variance = p.rate_noise if gyro_ok else p.initial_rate_variance
+    steered = mask == 0 and (gyro_ok or setting)
+    return Cycle(dt, gyro_ok, top, largest, mask != 0, mask, started, steered, rate, rate_variance, track)
 
 
 @kernel
@@ -291,6 +305,7 @@ def close_cycle(
         outcome.cells,
         outcome.mask,
         _mode(cycle, outcome, tracking.validity),
+        cycle.light,
     )
     shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, cycle.dt, cycle.largest, aiding.sky.predicted)
     tracking, heading = finish_with_rate(p.tracking, tracking, cycle.dt, aiding, cycle.gyro_ok, shadow, estimate, rate)

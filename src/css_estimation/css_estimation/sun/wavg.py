@@ -4,27 +4,34 @@
 The sum runs over the cells that see the Sun, and the gate of `lit_cells` decides which these are. While it is
 relative, a scale common to all cells has no effect: the method's main virtue.
 
+Where one cell alone sees the Sun its output is the cosine of the heading's error, the measure that the paper speaks
+of: the Sun is that far from the normal, on any side. The covariance says so, with the cell's own error to the bad side;
+of an average of several cells there is none.
+
 Modes: 0 no Sun, 1 average of several cells, 2 a single cell (the error can reach its half view), 3
 brightest cell below an absolute gate.
 """
 
 from typing import NamedTuple
 
-from css_common.declared import builder, part, table_of
+from css_common.declared import builder, given, part, table_of
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, norm, scale
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest
-from css_estimation.sun.lit_cells import Gate, lit_cells
+from css_estimation.sun.lit_cells import CELL_SIGMA, Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_algorithm import no_memory
-from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, SunHeading
+from css_estimation.sun.sun_heading import NO_COVARIANCE, Aiding, Covariance, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
+from css_estimation.sun.sunline_filter import constrain
+from css_estimation.symmetric import isotropic, row_major
 
 MODE_AVERAGE = 1
 MODE_SINGLE_CELL = 2
 MODE_BELOW_GATE = 3
 
+_LARGEST_VARIANCE = 4.0
 # Normals that cancel to less than this leave no direction.
 _NO_DIRECTION = 1e-6
 
@@ -32,6 +39,7 @@ _NO_DIRECTION = 1e-6
 class WavgParameters(NamedTuple):
     """All of the estimator."""
 
+    cell_sigma: float = given(CELL_SIGMA)
     snapshot: SnapshotParameters = part(SnapshotParameters)
 
 
@@ -56,7 +64,7 @@ def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tupl
         top: result of `brightest`.
     """
     cells = layout.cells
-    lit, mask = lit_cells(gate, voltages, top)
+    lit, mask = lit_cells(layout, gate, voltages, top)
     if not lit:
         return (0.0, 0.0, 0.0), 0, MODE_NO_SUN
     if mask == 0:
@@ -75,6 +83,19 @@ def weighted_average(layout: CellLayout, gate: Gate, voltages, top: int) -> tupl
 
 
 @kernel
+def single_cell_covariance(layout: CellLayout, i: int, output: float, cell_sigma: float) -> Covariance:
+    """Covariance of a heading along the normal of cell `i`, which alone sees the Sun and reads cos(error).
+
+    On average over all sides each axis across the normal has half of sin^2.
+    """
+    cell = layout.cells[i]
+    normal_b = (cell.nx, cell.ny, cell.nz)
+    cosine = max(min(output, 1.0) - cell_sigma, layout.cos_half_view, 0.0)
+    variance = 0.5 * (1.0 - cosine * cosine)
+    return row_major(constrain(normal_b, normal_b, isotropic(variance), _LARGEST_VARIANCE)[1])
+
+
+@kernel
 def step(
     p: WavgParameters,
     state: TrackingState,
@@ -86,5 +107,8 @@ def step(
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     top = brightest(voltages)
     sun_b, lit_mask, mode = weighted_average(p.snapshot.layout, p.snapshot.gate, voltages, top)
-    seen = Snapshot(sun_b, NO_COVARIANCE, lit_mask, mode)
+    covariance = NO_COVARIANCE
+    if mode in (MODE_SINGLE_CELL, MODE_BELOW_GATE):
+        covariance = single_cell_covariance(p.snapshot.layout, top, voltages[top], p.cell_sigma)
+    seen = Snapshot(sun_b, covariance, lit_mask, mode)
     return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, seen)

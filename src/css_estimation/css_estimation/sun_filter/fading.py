@@ -10,6 +10,8 @@ from css_estimation.sun_filter.response import respond
 
 # Part of the expected output below which the Sun is setting.
 _FADED = 0.88
+# Part above which it has risen again.
+_RISEN = 0.96
 # A penumbra is over within minutes on any orbit of the Earth below the Moon's; what lasts longer is another intensity.
 _LASTING = 120.0  # [s]
 _MARGIN = 0.1  # in cosines
@@ -39,7 +41,7 @@ def fading(p: SunFilterParameters, x, covariance, sun_n: Vec3, flux: float, volt
     What lasts is taken for another intensity, of which the filter then learns.
     """
     part = part_of_expected(p, x, sun_n, flux, voltages)
-    if part > _FADED:
+    if part > (_RISEN if faded > 0.0 else _FADED):
         return 0.0
     if faded + dt > _LASTING:
         x[X_SCALE] = part * (1.0 + x[X_SCALE]) - 1.0

@@ -44,7 +44,7 @@ from css_estimation.sun_filter import options
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
 from css_estimation.sun_filter.field_update import field_usable, read_field
-from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, weigh
+from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, the_only_one, weigh
 from css_estimation.sun_filter.memory import (
     DEAD,
     DIRECTIONS,
@@ -324,8 +324,13 @@ def _track(
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
-    # an orbit model tells a penumbra better, and while turns are looked for outputs are not as expected
-    if use and not earth_known and heading_sigma(best_covariance, sun_n) < _CONVERGED:
+    # while turns are looked for outputs are not as expected; a model of the orbit may be late by as much as a place
+    # errs
+    settled = not earth_known or the_only_one(memory) == best
+    if not use:
+        # light that comes back has to be whole again
+        faded = max(faded, dt)
+    elif settled and heading_sigma(best_covariance, sun_n) < _CONVERGED:
         faded = fading(p, best_x, best_covariance, sun_n, cycle.flux, voltages, faded, dt)
         use = faded == 0.0
     if use:

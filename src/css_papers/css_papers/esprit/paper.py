@@ -72,7 +72,8 @@ def reproduce(request: Request) -> list[Row]:
     lead = (
         f"A flight of the mission {mission.name}: {mission.values.mission.duration:g} s from lift-off, three slits, a "
         f"timer of {mission.values.slits.counter_hz:g} Hz and a magnetometer, the estimators that fly. Seed "
-        f"{mission.values.mission.seed}, case {mission.values.mission.case}."
+        f"{mission.values.mission.seed}, case {mission.values.mission.case}. Spin, cone and periods of the paper "
+        "are what the rocket is given: what stands here is recovered from its pulses, not predicted."
     )
     write_page(Page(TITLE, lead, sections), request.folder)
     return rows

@@ -9,6 +9,7 @@ from css_papers.okeefe import calibration_page
 from css_papers.okeefe.configurations import AS_PRINTED, IMPROVED, MISSION
 from css_papers.okeefe.flight_figures import Variant
 from css_papers.okeefe.flight_part import flight_part, settings
+from css_papers.okeefe.numbers import MEASURED, notable
 from css_papers.okeefe.one_change import control_configurations, control_table, difference_notes
 from css_papers.okeefe.sensor_part import sensor_part
 from css_papers.okeefe.sweeps import sweep_configurations
@@ -44,8 +45,9 @@ def reproduce(request: Request) -> list[Row]:
     flights = flight_part(mission, printed, improved, notes, request.folder)
     rows = [*sensors.rows, *flights.rows]
     missed = sum(not row.ok for row in rows)
+    worse = notable(rows)
     summary = f"{len(rows)} numbers, {missed or 'none'} of them not what they must be."
-    table = Section("Paper and here", [summary, Table(*table_of(rows)), Listing(notes_of(rows))])
+    table = Section("Paper and here", [summary, Table(*table_of(rows)), Listing([*worse, *MEASURED, *notes_of(rows)])])
     lead = (
         f"Flights of the mission {mission.name}, {request.cases} cases of one orbit for each configuration; "
         "configurations share their draws. The average is the weighted average (WAVG) of the paper, the filter its "
