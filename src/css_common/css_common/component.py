@@ -14,6 +14,7 @@ from css_common.codec import Sample
 from css_common.epochs import mission_epoch
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
+from css_common.sections import DURATION, EPOCH
 from css_common.shared_sections import conflicts, section_table
 
 if TYPE_CHECKING:
@@ -122,6 +123,7 @@ class Component:
     shared: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[Table] = ()
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
+    _needed_by_host: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
@@ -155,6 +157,11 @@ class Component:
     def needed(cls, values: Values) -> Iterable[str]:
         """Names of parameters without a default that it cannot do without; they have an example in their table."""
         return ()
+
+    @classmethod
+    def asked_for(cls, values: Values) -> Iterable[str]:
+        """Names of all parameters without a default that it or its host cannot do without."""
+        return dict.fromkeys((*cls.needed(values), *cls._needed_by_host))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
@@ -208,6 +215,7 @@ class Plant(Component):
 
     finished: bool = False
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io", "lockstep")
+    _needed_by_host: ClassVar[tuple[str, ...]] = (EPOCH.name, DURATION.name)
 
     @classmethod
     def fastest_start(cls, values: Values) -> float:
@@ -228,7 +236,7 @@ class Plant(Component):
 
 def missing_values(component_type: type[Component], values: Values) -> Iterator[str]:
     """What a component needs and has not been given, one message each."""
-    return missing(component_type.table(), values, component_type.needed(values))
+    return missing(component_type.table(), values, component_type.asked_for(values))
 
 
 def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:

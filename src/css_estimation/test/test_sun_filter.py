@@ -71,14 +71,13 @@ def test_the_sun_is_found_from_anywhere_that_three_cells_see(layout):
 
 
 @pytest.mark.parametrize("layout", ["dual pyramid", "six faces", "Clark's fourteen"])
-def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_error_bar(layout):
+def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_error_bar(layout, monkeypatch):
     errors = []
     for known in (True, False):
         flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.005, earth=(0.3, 0.9, 0.2), **LAYOUTS[layout])
         if not known:
             flight.sky = flight.sky._replace(known=False)
-            voltages = flight.voltages
-            flight.voltages = partial(_with_earth, flight, voltages)
+            monkeypatch.setattr(flight, "voltages", partial(_with_earth, flight, flight.voltages))
         heading = flight.fly(400.0, gyro=True)
         errors.append(flight.error_deg(heading))
     assert heading.mode == sun_filter.MODE_NO_EARTH

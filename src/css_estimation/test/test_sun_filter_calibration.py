@@ -9,7 +9,7 @@ from okeefe_spacecraft import okeefe_values
 from sun_filter_flight import DT, SunFilterFlight, outputs_of
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.vectors import axes_across, matmul, multiply, unit
+from css_common.vectors import axes_across, matmul, multiply, multiply_transposed, unit
 from css_environment.albedo import albedo_output, new_workspace
 from css_estimation.nodes.sun_filter import SunFilter
 from css_estimation.sun.sun_heading import UNAIDED
@@ -57,7 +57,7 @@ class Uncalibrated(SunFilterFlight):
         """Turns about one axis of the body after the other, nearly a full circle about each."""
         for axis in ((1.0, 0.0, 0.2), (0.3, 0.3, 0.9), (0.0, 1.0, 0.0), (0.3, -0.8, 0.6), (-0.5, 0.7, 0.5)):
             momentum_b = multiply(self.p.motion.inertia, tuple(0.04 * np.array(axis)))
-            self.momentum_n = multiply(tuple(zip(*self.dcm_bn, strict=True)), momentum_b)
+            self.momentum_n = multiply_transposed(self.dcm_bn, momentum_b)
             self.fly(130.0, gyro=True)
 
     def voltages(self, part=1.0):

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from presence import present
 
 from css_common.mission import load_mission
 from css_papers.best import paper
@@ -49,7 +50,7 @@ def test_a_short_flight_gives_a_page(tmp_path, monkeypatch):
     assert all(row.quantity.startswith("short") for row in rows)
     by_name = {(row.quantity, row.variant): row for row in rows}
     assert by_name["short: Sun found", "gyro"].here == 1.0
-    assert by_name["short: heading error", "no gyro"].here < 5.0
+    assert present(by_name["short: heading error", "no gyro"].here) < 5.0
     # no eclipse within five minutes: what was not measured does not meet what it must
     assert by_name["short: in eclipse", "gyro"].here is None and not by_name["short: in eclipse", "gyro"].ok
     text = (tmp_path / "README.md").read_text(encoding="utf-8")

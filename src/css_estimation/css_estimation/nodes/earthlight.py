@@ -7,6 +7,7 @@ from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
 from css_estimation.messages import attitude_estimate_fields
 from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.sun_estimator import aiding_of, inputs_of
@@ -30,7 +31,7 @@ class Earthlight(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("cells.normals", "orbit.source")
+        return ("cells.normals", *needed_of_orbit(values), *needed_of_wheel_momentum(values))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
