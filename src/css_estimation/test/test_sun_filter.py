@@ -209,6 +209,22 @@ def test_another_intensity_is_learnt():
     assert flight.error_deg(heading) < 0.3
 
 
+@pytest.mark.parametrize("broken", [-1.0, np.nan, np.inf])
+def test_a_covariance_that_is_none_ends_the_estimate_and_not_the_filter(broken):
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.005, earth=(0.3, 0.9, 0.2))
+    flight.fly(60.0)
+    states = flight.memory.covariances.shape[1]
+    flight.memory.covariances[:] = broken * np.eye(states)
+    for _ in range(20):
+        heading = flight.step()
+        assert np.isfinite([*heading.sun_b, *heading.covariance, *heading.omega_bn_b]).all()
+        assert np.linalg.norm(heading.sun_b) == pytest.approx(1.0)
+        assert sum(heading.covariance[::4]) > 0.0
+    heading = flight.fly(60.0)
+    assert heading.validity == VALIDITY_VALID
+    assert flight.error_deg(heading) < 2.0
+
+
 def test_a_silence_is_not_bridged():
     flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.002, **NO_EARTH)
     flight.fly(60.0)

@@ -124,6 +124,24 @@ def test_gravity_turns_the_momentum_by_its_torque_once_it_is_reckoned_with():
     assert np.linalg.norm(torque_b) > 1e-7
 
 
+def test_an_unstable_spin_leaves_the_covariance_symmetric():
+    """What rounding makes unequal grows as the motion does, and no reading takes it away again."""
+    x, covariance = start(RATE_BY_MOMENTUM)
+    axes = np.linalg.eigh(INERTIA)[1]
+    omega = tuple(0.3 * axes[:, 1] + 1e-3 * axes[:, 0])
+    begin_rate(P, RATE_BY_MOMENTUM, omega, 1e-6, (0.0, 0.0, 0.0), x, covariance)
+    h = np.zeros(len(covariance))
+    for k in range(4000):
+        go_on(QUIET, RATE_BY_MOMENTUM, GYRO_B, (0.0, 0.0, 0.0), NOWHERE, 0.25, GAIN + 8, x, covariance)
+        # one direction at a time is measured to 3 mrad
+        h[THETA : THETA + 3] = 0.0
+        h[THETA + k % 3] = 1.0
+        gained = covariance @ h
+        covariance -= np.outer(gained, gained) / (h @ gained + 1e-5)
+    assert np.abs(covariance - covariance.T).max() <= 1e-9 * np.abs(covariance).max()
+    assert np.linalg.eigvalsh(covariance[:6, :6]).min() > -1e-12
+
+
 @MODELS
 @pytest.mark.parametrize("after", [RATE_BY_GYRO, RATE_BY_MOMENTUM, RATE_BY_WALK])
 def test_another_source_of_the_rate_begins_with_the_rate_of_the_last(model, after):

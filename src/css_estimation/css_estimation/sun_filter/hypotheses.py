@@ -180,13 +180,14 @@ def loosen(covariance, sun_n: Vec3, since: float, dt: float) -> None:
 
 @kernel
 def weigh(m: SunFilterMemory, k: int, likelihood: float) -> None:
-    """Adds the likelihood of a cycle's outputs to the weight of a hypothesis."""
-    m.weights[k] += _NEWS * likelihood
+    """Adds the likelihood of a cycle's outputs to the weight of a hypothesis; one that is no number is given up."""
+    weight = m.weights[k] + _NEWS * likelihood
+    m.weights[k] = weight if math.isfinite(weight) else DEAD
 
 
 @kernel
 def give_up(m: SunFilterMemory) -> tuple[int, int]:
-    """Gives up what is unlikely, or the same as the best; gives the best one and how many are left."""
+    """Gives up what is unlikely, or the same as the best; gives the best one and how many are left, perhaps none."""
     best = 0
     for k in range(HYPOTHESES):
         if m.weights[k] > m.weights[best]:

@@ -23,7 +23,7 @@ from css_common.declared import builder
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
 from css_common.schema import Values
-from css_common.vectors import Vec3, matmul, multiply, norm, scale, unit
+from css_common.vectors import Vec3, dot, matmul, multiply, norm, scale, unit
 from css_estimation.sun import eclipse_detector
 from css_estimation.sun.eclipse_detector import EclipseState, detect_eclipse
 from css_estimation.sun.low_pass import low_pass, low_pass_gain
@@ -420,7 +420,7 @@ def _progress(
         if refused + reading.nis_dof > 0:
             share = 1.0 if reading.contrary > 0 else refused / (refused + reading.nis_dof)
             contrary += (share - contrary) * min(1.0, cycle.dt / _CONTRARY_TIME)
-    if _lost(p, contrary, sigma, x, sun_n, cycle.flux, voltages):
+    if left == 0 or _lost(p, contrary, sigma, x, sun_n, cycle.flux, voltages):
         return _AFRESH, mode
     if contrary > _CONTRARY_SHARE:
         contrary = 0.0
@@ -431,7 +431,7 @@ def _progress(
     if use and aiding.sky.known and converged:
         look_for_roll(p, memory, sun_n)
         stage, since = _STAGE_ROLL, 0.0
-    elif stage == _STAGE_ROLL and left == 1 and p.calibration.per_cell > 0 and earth_is_elsewhere(p, x):
+    elif stage == _STAGE_ROLL and left == 1 and earth_is_elsewhere(p, x):
         look_again(p, memory, best, sun_n)
         since = 0.0
     return Progress(stage, True, since, contrary, faded), mode
@@ -478,8 +478,9 @@ def step(
     else:
         progress, rate, reading, mode = _track(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = heading_of(p, memory, aiding.sky.sun_n, progress.stage == _STAGE_ROLL)
-        if not (_finite(sun_b) and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
-            # beyond what numbers can hold: nothing is known any more
+        a_direction = _finite(sun_b) and dot(sun_b, sun_b) > 0.0 and mean_variance(covariance) > 0.0
+        if not (a_direction and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
+            # no hypothesis is left, or beyond what numbers can hold: nothing is known any more
             progress, rate = _AFRESH, Rate(rate.model, _NO_RATE, _NO_RATE)
             reading, mode = NOTHING_READ, MODE_COASTING
             sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
