@@ -9,6 +9,7 @@ from css_papers.best.layouts import layouts
 
 MISSION = "okeefe_sun_filter"
 CALIBRATION = "okeefe_calibration"
+CUBESAT = "cubesat_3u_sun_filter"
 FILTER = "sun_filter"
 
 # what the filter's mission says of cells and Earth
@@ -41,6 +42,9 @@ _HARDER = {
     "dynamics.dispersion.friction": "0.2",
     "dynamics.tachometer.resolution_rpm": "1",
 }
+_GRAVITY = {"dynamics.disturbances.gravity_gradient": "true", f"{FILTER}.rate.gravity_gradient": "true"}
+_TORQUE = {"dynamics.disturbances.torque": "5.8e-7,5.8e-7,5.8e-7"}
+_INTEGRATED = 16.0  # [deg] what such a torque makes of 8 kg m^2 in 35 min of shadow
 _PLACE_INTEGRATED = {"orbit.model": "j2_integrated"}
 
 
@@ -54,6 +58,8 @@ class Scenario(NamedTuple):
     side: bool = False  # left out when it must be quick
     mission: str = MISSION
     error: str = "heading_error_mean_deg"  # column of the heading error that is asked for
+    eclipse_must: float = 2.0  # [deg] largest mean error in the shadow, where a heading error is asked for
+    gyros: tuple[bool, ...] = (True, False)  # flown with and without
 
     def configuration(self, gyro: bool) -> Configuration:
         """How it flies."""
@@ -86,6 +92,9 @@ def scenarios() -> list[Scenario]:
             Scenario(name, layout.settings, _LARGEST.get(name), side=name != "six faces")
             for name, layout in cells.items()
         ),
+        Scenario("gravity's torque, reckoned with", _GRAVITY, 0.3, side=True),
+        Scenario("1e-6 N m that nobody knows", _TORQUE, 0.3, side=True, eclipse_must=_INTEGRATED),
+        Scenario("3U cubesat, six faces and magnetometer", {}, side=True, mission=CUBESAT, gyros=(False,)),
         Scenario("harder truth", _HARDER),
         Scenario("harder truth, the flight's orbit integrated too", _HARDER | _PLACE_INTEGRATED, side=True),
         _of_the_paper("ekf", "harder truth, the paper's filter (ekf)", _CLOUDS | _HARDER),
