@@ -2,6 +2,8 @@
 """Attitude about all three axes from cells, gyro or wheels, and the orbit; no magnetometer."""
 
 from collections.abc import Iterable
+from types import ModuleType
+from typing import ClassVar
 
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
@@ -18,6 +20,7 @@ from css_msgs.msg import AttitudeEstimate
 class Earthlight(Component):
     """Attitude by the Sun filter: the Sun is one direction, the light of the Earth on the cells the other."""
 
+    algorithm: ClassVar[ModuleType] = earthlight
     shared = ("cells", "orbit", "magnetometer", "spacecraft", "wheels")
     parameters = earthlight.PARAMETERS
 
@@ -50,7 +53,7 @@ class Earthlight(Component):
         self._parameters = earthlight.parameters(values)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
