@@ -11,10 +11,11 @@ from css_monte_carlo.study import run_study
 from css_papers.best.calibration import calibration_section
 from css_papers.best.headings import ErrorsOverTheSky, all_layouts, directions, estimators, headings, over_the_sky
 from css_papers.best.scenarios import FILTER, Scenario, scenarios
+from css_papers.best.three_axes import three_axes
 from css_papers.page import Listing, Page, Section, Table, write_page
 from css_papers.papers import Request
 from css_papers.rows import Must, Row, notes_of, number, row, table_of
-from css_papers.study_columns import column
+from css_papers.study_columns import column, mean_of
 
 TITLE = "What the Sun filter attains: clouds, dusk, other layouts, no gyro"
 
@@ -51,13 +52,18 @@ def reproduce(request: Request) -> list[Row]:
         lines += list(_lines(scenario, study.cases))
         if study.flown:
             spent.append(f"{scenario.label}: {1e6 * study.cpu_s / study.flown:.1f} us a case and step, all of the loop")
+    more = []
+    if not request.quick:
+        rows_of_axes, section = three_axes(request)
+        rows += rows_of_axes
+        more = [section, calibration_section()]
     missed = sum(not line.ok for line in rows)
     summary = f"{len(rows)} numbers, {missed or 'none'} of them not what they must be."
     heading = ["", *(title for title, _ in _COLUMNS)]
     sections = [
         Section("Numbers", [summary, Table(*table_of(rows)), Listing(notes_of(rows))]),
         Section("All scenarios", [Table(heading, lines)]),
-        *([] if request.quick else [calibration_section()]),
+        *more,
         Section("Every estimator on every layout, at rest", [*sky_tables(_SKY_QUICK if request.quick else _SKY)]),
         Section("What is measured", [Listing(_DEFINITIONS)]),
     ]
@@ -119,16 +125,16 @@ def _rows(scenario: Scenario, cases: pa.Table) -> list[Row]:
         values = {name: column(cases, scenario.configuration(gyro), name) for _, name in _COLUMNS}
         label, variant = scenario.label, "gyro" if gyro else "no gyro"
         must = None if scenario.error_must is None else Must(None, scenario.error_must)
-        error = row(f"{label}: heading error", "deg", None, _mean(values[scenario.error]), must, variant=variant)
+        error = row(f"{label}: heading error", "deg", None, mean_of(values[scenario.error]), must, variant=variant)
         rows.append(error)
         if must is None:
             continue
-        eclipse, nees = _mean(values["heading_error_eclipse_deg"]), _mean(values["nees_mean"])
+        eclipse, nees = mean_of(values["heading_error_eclipse_deg"]), mean_of(values["nees_mean"])
         acquired = column(cases, scenario.configuration(gyro), "acquired_s")
         rows += [
             row(f"{label}: in eclipse", "deg", None, eclipse, Must(None, scenario.eclipse_must), variant=variant),
             row(f"{label}: NEES for each of 2", "-", None, nees, _CONSISTENT, variant=variant),
-            row(f"{label}: NIS for each", "-", None, _mean(values["nis_mean"]), _CONSISTENT, variant=variant),
+            row(f"{label}: NIS for each", "-", None, mean_of(values["nis_mean"]), _CONSISTENT, variant=variant),
             row(f"{label}: Sun found", "-", None, float(np.mean(np.isfinite(acquired))), _FOUND, variant=variant),
         ]
     return rows
@@ -140,10 +146,5 @@ def _lines(scenario: Scenario, cases: pa.Table) -> Iterator[list[str]]:
         values = []
         for _, name in _COLUMNS:
             of_cases = column(cases, configuration, name)
-            values.append(float(np.nanmax(of_cases)) if name == "converging_s" and len(of_cases) else _mean(of_cases))
+            values.append(float(np.nanmax(of_cases)) if name == "converging_s" and len(of_cases) else mean_of(of_cases))
         yield [f"{scenario.label}, {'gyro' if gyro else 'no gyro'}", *(number(value) for value in values)]
-
-
-def _mean(values: np.ndarray) -> float | None:
-    known = values[np.isfinite(values)]
-    return float(np.mean(known)) if len(known) else None
