@@ -22,7 +22,7 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_VALID,
 )
 from css_estimation.sun_filter import sun_filter
-from css_estimation.sun_filter.cell_update import rising
+from css_estimation.sun_filter.cell_model import rising
 from css_estimation.sun_filter.response import respond
 
 SIX = LAYOUTS["six faces"]
