@@ -17,6 +17,7 @@ from typing import Any
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
 from css_common.epochs import mission_epoch
+from css_common.fault_lines import FAULTS, SECTION, Host, entries_of, entry_parameter
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
@@ -57,7 +58,7 @@ __all__ = [
     "mission_from_text",
 ]
 
-_SCRIPTS = ("events.", "criteria.")
+_SCRIPTS = ("events.", "criteria.", SECTION)
 _OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
 _MOST_NODES = 64
 
@@ -88,6 +89,7 @@ class Mission:
     """A validated mission. Use `load_mission`.
 
     Attributes:
+        faults: entries of the section `faults`; the parameters of their nodes have them, too.
         remarks: what is right but may not be what was meant, one line each.
     """
 
@@ -123,6 +125,9 @@ class Mission:
             self.values = shaped_values(known.values(), self.shared)
             _refuse(conflicts(self.values))
         self.nodes = self._build_nodes()
+        with _naming(origin, SHARED):
+            self.faults = entries_of(_below(SECTION, given), self._hosts())
+        self.nodes = tuple(self._with_faults(node) for node in self.nodes)
         tables = {node.name: node.component.table() for node in self.nodes}
         self._check_keys(tables if guest is None else tables | {guest[0]: guest[1].table()})
         self.events = events_of(_below("events.", given), tables, f"{origin}: {SHARED}")
@@ -164,7 +169,7 @@ class Mission:
     def node_of(self, component: type[Component], name: str) -> Node:
         """A node for a component, with the mission's parameters, whether or not the graph lists it."""
         package, _, executable = component.__module__.partition(".nodes.")
-        return self._node(name, package, executable, component)
+        return self._with_faults(self._node(name, package, executable, component))
 
     @property
     def plant(self) -> Node | None:
@@ -264,6 +269,9 @@ class Mission:
         shared = shared_parameters()
         if key in shared:
             return None, shared[key]
+        of_fault = entry_parameter(key, self._hosts().values())
+        if of_fault is not None:
+            return None, of_fault
         head, _, rest = key.partition(".")
         known = [*shared]
         for node in self.nodes:
@@ -326,6 +334,19 @@ class Mission:
             if not (self._alone and any(missing_values(component, values))):
                 _refuse(all_conflicts(component, values))
         return Node(name, package, executable, component, canonical, values)
+
+    def _hosts(self) -> dict[str, Host]:
+        """What may fail, by node."""
+        faulty = [node for node in self.nodes if node.component.fault_kinds]
+        return {n.name: Host(n.component.fault_kinds, n.component.fault_units(n.values)) for n in faulty}
+
+    def _with_faults(self, node: Node) -> Node:
+        """A node with the faults of the mission's entries after those of its own parameter."""
+        lines = [entry.line for entry in self.faults if entry.node == node.name]
+        if not lines:
+            return node
+        canonical = {**node.canonical, FAULTS.name: [*node.canonical[FAULTS.name], *lines]}
+        return replace(node, canonical=canonical, values=shaped_values(node.component.table(), canonical))
 
     def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
         if entry.message_type is not output.message_type:

@@ -27,10 +27,13 @@ from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables, aligned_table
 from css_sim import (
+    actuator_faults,
+    axis_faults,
     cell_errors,
     cell_faults,
     cell_screen,
     earth_reflectivity,
+    faults,
     gyro,
     initial_conditions,
     latency,
@@ -124,8 +127,10 @@ class MissionFlight:
         bounds = sorted({0, *(b for b in begins if b < self.steps), self.steps})
         for first, end in pairwise(bounds):
             done = [event for event, begin in zip(self.mission.events, begins, strict=True) if begin <= first]
-            array = self._values_after(self._array, done)
-            yield Stretch(first, end, self._vehicle(done), cases._replace(faults=self._faults(array, cases.numbers)))
+            before = cases
+            cases = cases._replace(**self._faults(done, cases.numbers))
+            _go_on_holding(cases, before, self._begun_anew(done, first))
+            yield Stretch(first, end, self._vehicle(done), cases)
 
     def cases(self, numbers: np.ndarray, guess_deg: float = 0.0) -> tuple[Cases, list[CaseState]]:
         """Tables and initial states of cases (C,).
@@ -174,7 +179,10 @@ class MissionFlight:
             voltages=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
-            faults=self._faults(array, numbers),
+            **self._faults([], numbers),
+            faulty_wheels=np.stack([body.wheels for body in bodies]),
+            faulty_torque=np.zeros_like(momentum),
+            faulty_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             reflectivity=earths,
             cloud_fields=fields,
             cloud_motion=motions,
@@ -279,8 +287,27 @@ class MissionFlight:
         plant = self._plant.values
         return self._magnetometer is not None or plant.rods.fitted or initial_conditions.has_dipole(plant)
 
-    def _faults(self, array: Values, numbers: np.ndarray) -> np.ndarray:
-        return np.stack([cell_faults.case_faults(array, self._key(int(number))) for number in numbers])
+    def _faults(self, done: list[Event], numbers: np.ndarray) -> dict[str, np.ndarray]:
+        """The tables of faults of cases (C,) by their names in `Cases`, each (C, F)."""
+        array, plant = self._values_after(self._array, done), self._values_after(self._plant, done)
+        gyro_values, field_values = (
+            None if node is None else self._values_after(node, done) for node in (self._gyro, self._magnetometer)
+        )
+        keys = [self._key(int(number)) for number in numbers]
+        of_cases = {
+            "faults": [cell_faults.case_faults(array, key) for key in keys],
+            "actuator_faults": [actuator_faults.case_faults(plant, key) for key in keys],
+            "gyro_faults": [axis_faults.case_faults(gyro_values, "gyro", key) if gyro_values else [] for key in keys],
+            "field_faults": [
+                axis_faults.case_faults(field_values, "magnetometer", key) if field_values else [] for key in keys
+            ],
+        }
+        return {name: np.stack([faults.rows(of_case) for of_case in cases]) for name, cases in of_cases.items()}
+
+    def _begun_anew(self, done: list[Event], step: int) -> set[str]:
+        """Tables of faults of the sensors that are switched on at a step, and know nothing of before."""
+        sensors = {"gyro_faults": self._gyro, "field_faults": self._magnetometer}
+        return {name for name, sensor in sensors.items() if step > 0 and self._on_since(sensor, done) == step}
 
     def _key(self, case: int) -> RandomKey:
         return random_key(self.mission.values.mission.seed, case)
@@ -290,6 +317,17 @@ class MissionFlight:
         canonical = dict(node.canonical)
         canonical |= {e.parameter: e.value for e in done if e.node == node.name and e.action == "set"}
         return shaped_values(node.component.table(), canonical)
+
+
+_FAULTS = ("faults", "gyro_faults", "field_faults", "actuator_faults")
+
+
+def _go_on_holding(cases: Cases, before: Cases, anew: set[str]) -> None:
+    """Lets frozen units stay where they were, but for those of tables `anew`."""
+    for name in _FAULTS:
+        if name not in anew:
+            for now, then in zip(getattr(cases, name), getattr(before, name), strict=True):
+                faults.with_held(now, then)
 
 
 def _values(node: Node | None) -> Values | None:

@@ -12,6 +12,8 @@ from css_common.random_streams import random_key
 from css_common.sections import MISSION, RODS, SPACECRAFT, WHEELS
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances, initial_conditions
+from css_sim.actuator_faults import with_room
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.rigid_body import RotationState, propagate
 from css_sim.spacecraft import advance, rod_dipole, spacecraft
 
@@ -20,20 +22,22 @@ IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ENVIRONMENT = EnvironmentState(
     (6.778e6, 1e5, -2e5), (100.0, 5.4e3, 5.4e3), (0.0, 0.6, 0.8), 0.97, 1.0, (1e-5, -2e-5, 3e-5), IDENTITY
 )
+KEY = random_key(1, 0)
 STATE = RotationState((0.1, 0.2, -0.3), (0.02, -0.01, 0.03))
 COMMAND = np.array([0.01, -0.02, 0.005, 0.0])
 
 
 def build(**changes):
-    return spacecraft(okeefe_values(TABLE, **changes), random_key(1, 0))
+    return spacecraft(okeefe_values(TABLE, **changes), KEY)
 
 
 def fly(craft, rods=(), steps=1):
     """State and wheel momenta after some cycles of 0.1 s."""
     state, momentum, applied = STATE, np.array([0.1, -0.1, 0.05, 0.0]), np.zeros(4)
     rods = np.array(rods, dtype=float)
-    for _ in range(steps):
-        state, *_ = advance(craft, state, momentum, COMMAND, rods, ENVIRONMENT, 0.1, applied)
+    sound = with_room(NO_FAULTS, len(momentum), len(rods))
+    for k in range(steps):
+        state, *_ = advance(craft, sound, KEY, k, state, momentum, COMMAND, rods, ENVIRONMENT, 0.1, applied)
     return state, momentum
 
 
