@@ -346,7 +346,11 @@ class Mission:
         if not lines:
             return node
         canonical = {**node.canonical, FAULTS.name: [*node.canonical[FAULTS.name], *lines]}
-        return replace(node, canonical=canonical, values=shaped_values(node.component.table(), canonical))
+        values = shaped_values(node.component.table(), canonical)
+        if not any(missing_values(node.component, values)):
+            with _naming(self.origin, node.name):
+                _refuse(all_conflicts(node.component, values))
+        return replace(node, canonical=canonical, values=values)
 
     def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
         if entry.message_type is not output.message_type:

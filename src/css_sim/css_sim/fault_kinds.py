@@ -111,10 +111,11 @@ _BY_SORT = {
     "tachometer": (*_READINGS, "saturated"),
 }
 
-KINDS: tuple[FaultKind, ...] = (
-    *(_kind(sort, name) for sort, names in _BY_SORT.items() for name in names),
-    *_CELL_KINDS,
-    *_WHEEL_KINDS,
+KINDS: tuple[FaultKind, ...] = tuple(
+    sorted(
+        (*(_kind(sort, name) for sort, names in _BY_SORT.items() for name in names), *_CELL_KINDS, *_WHEEL_KINDS),
+        key=lambda kind: SORTS[kind.sort],
+    )
 )
 
 
@@ -122,6 +123,3 @@ def kinds_of(*sorts: str) -> tuple[FaultKind, ...]:
     """All kinds of faults of some sorts of units."""
     return tuple(kind for kind in KINDS if kind.sort in sorts)
 
-
-NAMES = {kind.code: kind.name for kind in KINDS}
-"""Kinds by their codes."""
