@@ -118,7 +118,7 @@ def _digits(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def conflicts(lines: Iterable[str], kinds: Iterable[FaultKind], units: Units) -> Iterable[str]:
+def conflicts(lines: list[str], kinds: Iterable[FaultKind], units: Units) -> Iterable[str]:
     """What is wrong with the lines of a node, one message each."""
     kinds = tuple(kinds)
     for line in lines:

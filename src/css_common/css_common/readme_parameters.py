@@ -3,8 +3,8 @@
 
     ./sunpoint shell -c 'python -m css_common.readme_parameters src/*/README.md'
 
-writes them anew where they stand: below a heading `### NODE`, with the columns of `HEADER`; that of the faults which the
-units of those nodes may have, with the columns of `FAULT_HEADER`.
+writes them anew where they stand: below a heading `### NODE`, with the columns of `HEADER`; that of the faults that
+the units of those nodes may have, with the columns of `FAULT_HEADER`.
 """
 
 import re

@@ -50,6 +50,15 @@ class Vehicle(NamedTuple):
     array_normal_b: Vec3
 
 
+class FaultTables(NamedTuple):
+    """Faults of all cases, each (C, F) of fault_effects.FAULT."""
+
+    cells: np.ndarray
+    gyro: np.ndarray
+    magnetometer: np.ndarray
+    actuators: np.ndarray  # wheels, tachometers and rods
+
+
 class Cases(NamedTuple):
     """What differs from case to case, one row each."""
 
@@ -68,10 +77,7 @@ class Cases(NamedTuple):
     voltages: np.ndarray  # (C, n) [V]
     rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
-    faults: np.ndarray  # (C, F) of fault_effects.FAULT, of the cells
-    gyro_faults: np.ndarray  # (C, F) of the gyro
-    field_faults: np.ndarray  # (C, F) of the magnetometer
-    actuator_faults: np.ndarray  # (C, F) of wheels, tachometers and rods
+    faults: FaultTables
     faulty_wheels: np.ndarray  # (C, N) of rigid_body.WHEEL, room for wheels with faults
     faulty_torque: np.ndarray  # (C, N) [N m] room for what they are commanded
     faulty_dipole: np.ndarray  # (C, M) [A m^2] the same of the rods
@@ -126,11 +132,15 @@ def fly_block(
         disturbances = with_dipole(v.craft.disturbances, row(cases.dipole, c))
         craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipole, v.craft.disturbed)
         key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
-        cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
+        cells = CellsOfCase(cases.cells[c], cases.faults.cells[c], cases.albedo[c], cases.work[c])
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
         field_bias_b = magnetometer.draw_bias(v.sensors.magnetometer, key)
         lags = draw_lags(v.sensors, key)
-        gyro_faults, field_faults, actuator_faults = cases.gyro_faults[c], cases.field_faults[c], cases.actuator_faults[c]
+        gyro_faults, field_faults, actuator_faults = (
+            cases.faults.gyro[c],
+            cases.faults.magnetometer[c],
+            cases.faults.actuators[c],
+        )
         sensors = SensorsOfCase(
             key, cells, gyro_errors, gyro_faults, field_bias_b, field_faults, lags, cases.history[c]
         )

@@ -22,7 +22,7 @@ from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
 from css_monte_carlo.case_tallies import step_marks
-from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
+from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, FaultTables, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables, aligned_table
@@ -33,7 +33,6 @@ from css_sim import (
     cell_faults,
     cell_screen,
     earth_reflectivity,
-    faults,
     gyro,
     initial_conditions,
     latency,
@@ -42,6 +41,7 @@ from css_sim import (
     sun_cells,
     tachometer,
 )
+from css_sim.faults import CaseFault, rows, with_held
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
 from css_sim.spacecraft import spacecraft
@@ -128,8 +128,8 @@ class MissionFlight:
         for first, end in pairwise(bounds):
             done = [event for event, begin in zip(self.mission.events, begins, strict=True) if begin <= first]
             before = cases
-            cases = cases._replace(**self._faults(done, cases.numbers))
-            _go_on_holding(cases, before, self._begun_anew(done, first))
+            cases = cases._replace(faults=self._faults(done, cases.numbers))
+            _go_on_holding(cases.faults, before.faults, self._begun_anew(done, first))
             yield Stretch(first, end, self._vehicle(done), cases)
 
     def cases(self, numbers: np.ndarray, guess_deg: float = 0.0) -> tuple[Cases, list[CaseState]]:
@@ -179,7 +179,7 @@ class MissionFlight:
             voltages=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
-            **self._faults([], numbers),
+            faults=self._faults([], numbers),
             faulty_wheels=np.stack([body.wheels for body in bodies]),
             faulty_torque=np.zeros_like(momentum),
             faulty_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
@@ -287,26 +287,27 @@ class MissionFlight:
         plant = self._plant.values
         return self._magnetometer is not None or plant.rods.fitted or initial_conditions.has_dipole(plant)
 
-    def _faults(self, done: list[Event], numbers: np.ndarray) -> dict[str, np.ndarray]:
-        """The tables of faults of cases (C,) by their names in `Cases`, each (C, F)."""
+    def _faults(self, done: list[Event], numbers: np.ndarray) -> FaultTables:
+        """The faults of cases (C,) once scripted changes have been made."""
         array, plant = self._values_after(self._array, done), self._values_after(self._plant, done)
-        gyro_values, field_values = (
-            None if node is None else self._values_after(node, done) for node in (self._gyro, self._magnetometer)
-        )
         keys = [self._key(int(number)) for number in numbers]
-        of_cases = {
-            "faults": [cell_faults.case_faults(array, key) for key in keys],
-            "actuator_faults": [actuator_faults.case_faults(plant, key) for key in keys],
-            "gyro_faults": [axis_faults.case_faults(gyro_values, "gyro", key) if gyro_values else [] for key in keys],
-            "field_faults": [
-                axis_faults.case_faults(field_values, "magnetometer", key) if field_values else [] for key in keys
-            ],
-        }
-        return {name: np.stack([faults.rows(of_case) for of_case in cases]) for name, cases in of_cases.items()}
+
+        def of_axes(sensor: Node | None, sort: str) -> list[list[CaseFault]]:
+            if sensor is None:
+                return [[] for _ in keys]
+            values = self._values_after(sensor, done)
+            return [axis_faults.case_faults(values, sort, key) for key in keys]
+
+        return FaultTables(
+            cells=_stacked([cell_faults.case_faults(array, key) for key in keys]),
+            gyro=_stacked(of_axes(self._gyro, "gyro")),
+            magnetometer=_stacked(of_axes(self._magnetometer, "magnetometer")),
+            actuators=_stacked([actuator_faults.case_faults(plant, key) for key in keys]),
+        )
 
     def _begun_anew(self, done: list[Event], step: int) -> set[str]:
-        """Tables of faults of the sensors that are switched on at a step, and know nothing of before."""
-        sensors = {"gyro_faults": self._gyro, "field_faults": self._magnetometer}
+        """Which of `FaultTables` are of a sensor that is switched on at a step and knows nothing of before."""
+        sensors = {"gyro": self._gyro, "magnetometer": self._magnetometer}
         return {name for name, sensor in sensors.items() if step > 0 and self._on_since(sensor, done) == step}
 
     def _key(self, case: int) -> RandomKey:
@@ -319,15 +320,17 @@ class MissionFlight:
         return shaped_values(node.component.table(), canonical)
 
 
-_FAULTS = ("faults", "gyro_faults", "field_faults", "actuator_faults")
+def _stacked(of_cases: list[list[CaseFault]]) -> np.ndarray:
+    """Table (C, F) of the faults of cases."""
+    return np.stack([rows(of_case) for of_case in of_cases])
 
 
-def _go_on_holding(cases: Cases, before: Cases, anew: set[str]) -> None:
+def _go_on_holding(tables: FaultTables, before: FaultTables, anew: set[str]) -> None:
     """Lets frozen units stay where they were, but for those of tables `anew`."""
-    for name in _FAULTS:
+    for name, now, then in zip(FaultTables._fields, tables, before, strict=True):
         if name not in anew:
-            for now, then in zip(getattr(cases, name), getattr(before, name), strict=True):
-                faults.with_held(now, then)
+            for of_case, earlier in zip(now, then, strict=True):
+                with_held(of_case, earlier)
 
 
 def _values(node: Node | None) -> Values | None:

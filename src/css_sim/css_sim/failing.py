@@ -5,7 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from css_common.component import Component, Outgoing, Output
+from css_common.codec import Sample
+from css_common.component import Component, Output
 from css_common.fault_lines import FAULTS
 from css_common.schema import Table, Values, flag
 from css_msgs.msg import Faults
@@ -43,7 +44,7 @@ class Failing:
         self._faults = faults
         self.table = with_held(rows(faults), self.table)
 
-    def told(self, component: Component, stamp_ns: int) -> Outgoing:
+    def told(self, component: Component, stamp_ns: int) -> dict[str, Sample]:
         """A message of the faults that act at a stamp, if they are others than those of the last message."""
         if _KEY not in component.frames or not (self._faults or self._told):
             return {}

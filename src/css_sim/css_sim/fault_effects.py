@@ -1,14 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """What faults make of a reading or a command, whatever has them: one kernel for cells, axes, wheels and rods.
 
-All but a frozen reading is a function of seed, case, cycle and the fault itself; a frozen one holds what it read when it
-began, for as long as its node runs.
+All but a frozen reading is a function of seed, case, cycle and the fault itself; a frozen one holds what it read when
+it began, for as long as its node runs.
 """
 
 import numpy as np
 
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
+from css_common.vectors import Vec3
 
 DEAD, STUCK, NOISY, DRIFTING, SCALED, BIAS, SIGN, SATURATED, FROZEN, SPIKES, INTERMITTENT = range(11)
 STUCK_LOW, STUCK_HIGH, WRAP, SWAPPED, SHADOWED, SILENT, FRICTION = range(11, 18)
@@ -108,7 +109,7 @@ def faulty(fault, key: RandomKey, stream: int, step: int, index: int, x: float) 
 @kernel
 def any_acts(faults, kind: int, step: int) -> bool:
     """Whether some fault (F,) of a kind acts at a control cycle."""
-    for k in range(faults.shape[0]):
+    for k in range(faults.shape[0]):  # noqa: SIM110 - no generators in kernels
         if faults[k].kind == kind and acts(faults[k], step):
             return True
     return False
@@ -142,7 +143,7 @@ def spoil(faults, sort: int, key: RandomKey, step: int, values) -> None:
 
 
 @kernel
-def spoil_axes(faults, sort: int, key: RandomKey, step: int, vector):
+def spoil_axes(faults, sort: int, key: RandomKey, step: int, vector: Vec3) -> Vec3:
     """A vector of three axes after its faults (F,), as `spoil`."""
     x, y, z = vector
     for k in range(faults.shape[0]):

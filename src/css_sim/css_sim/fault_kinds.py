@@ -56,7 +56,7 @@ _COMMON = {
     "bias": lambda s: (effects.BIAS, (_amount(s, "offset"),), "plus this: a step, or constant from time 0 on"),
     "sign": lambda s: (effects.SIGN, (), "with the wrong sign"),
     "saturated": lambda s: (effects.SATURATED, (_amount(s, "limit", 0.0),), "never larger than this"),
-    "spikes": lambda s: (effects.SPIKES, (_amount(s, "size", 0.0), _SHARE), "off by this, either way, in a share of cycles"),
+    "spikes": lambda s: (effects.SPIKES, (_amount(s, "size", 0.0), _SHARE), "off by this, either way, now and then"),
     "intermittent": lambda s: (effects.INTERMITTENT, (_SHARE, _SPELL), "nothing in a share of spells of this length"),
     "silent": lambda s: (effects.SILENT, (), "says that it has no reading"),
 }  # fmt: skip
@@ -122,4 +122,3 @@ KINDS: tuple[FaultKind, ...] = tuple(
 def kinds_of(*sorts: str) -> tuple[FaultKind, ...]:
     """All kinds of faults of some sorts of units."""
     return tuple(kind for kind in KINDS if kind.sort in sorts)
-

@@ -8,7 +8,7 @@ changes no other.
 import math
 import zlib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ class CaseFault(NamedTuple):
 
 
 def case_faults(
-    lines: Iterable[str], kinds: Sequence[FaultKind], units: Units, key: RandomKey, period: float
+    lines: list[str], kinds: Sequence[FaultKind], units: Units, key: RandomKey, period: float
 ) -> list[CaseFault]:
     """Faults of one case, in the order of their lines; as many for all cases, some of which may never act.
 
@@ -89,9 +89,7 @@ def _faults_of(line: FaultLine, key: RandomKey, seed: int, period: float) -> Ite
     units = (line.units[int(which * len(line.units))],) if line.drawn else line.units
     for unit in units:
         code, values = line.kind.code, line.values
-        scaled = tuple(
-            x * v.factor * period**v.cycles for x, v in zip(values, line.kind.values, strict=True)
-        )
+        scaled = tuple(x * v.factor * period**v.cycles for x, v in zip(values, line.kind.values, strict=True))
         if code == effects.STUCK_RANDOM:
             u = uniform4(key, Stream.FAULT, 1 + unit, _OF_A_CASE | seed >> 1)[0]
             code, values = effects.STUCK, (values[0] + u * (values[1] - values[0]),)

@@ -9,8 +9,8 @@ from scipy import stats
 
 from css_common.random_streams import Stream, random_key
 from css_common.schema import default_values
-from css_sim.fault_effects import NO_FAULTS
 from css_sim import gyro, magnetometer
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.random_walk import HORIZON, random_walk
 
 SIGNIFICANCE = 1e-4
@@ -116,7 +116,9 @@ def test_magnetometer_bias_noise_and_resolution():
     p = magnetometer_parameters(bias_nt=500.0, noise_nt=0.0)
     biases = np.array([magnetometer.draw_bias(p, random_key(1, c)) for c in range(5000)])
     assert all(normal(biases[:, i], 500e-9) for i in range(3))
-    np.testing.assert_allclose(magnetometer.measure(p, biases[3], NO_FAULTS, KEY, 0, field), biases[3] + field, rtol=1e-15)
+    np.testing.assert_allclose(
+        magnetometer.measure(p, biases[3], NO_FAULTS, KEY, 0, field), biases[3] + field, rtol=1e-15
+    )
 
     p = magnetometer_parameters(noise_nt=150.0)
     noise = np.array([magnetometer.measure(p, STILL, NO_FAULTS, KEY, k, field) for k in range(20_000)]) - field

@@ -53,7 +53,11 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
         complain("criterion missed:", line)
     print_incidents(result)
     if as_json:
-        print_json(flight_object(result, runs) | {"faults": faults} | ({} if spinning is None else {"spin": spin_object(spinning)}))
+        print_json(
+            flight_object(result, runs)
+            | {"faults": faults}
+            | ({} if spinning is None else {"spin": spin_object(spinning)})
+        )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED

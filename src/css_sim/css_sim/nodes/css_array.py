@@ -36,7 +36,7 @@ class CssArray(Component):
 
     shared = ("cells",)
     fault_kinds = cell_faults.KINDS
-    _failing: Failing | None = None
+    _failing = Failing(())  # of a node that has not begun
     parameters = (
         *sun_cells.PARAMETERS,
         *cell_faults.PARAMETERS,

@@ -17,7 +17,15 @@ from css_common.run import node_main
 from css_common.schema import Values, flag, integer
 from css_common.sections import CASE, DURATION, PERIOD, ROD_AXES, RODS_FITTED, SEED, WHEEL_AXES, WHEELS_FITTED
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
-from css_sim import actuator_faults, disturbances, failing, flight_environment, initial_conditions, orbit_dispersion, tachometer
+from css_sim import (
+    actuator_faults,
+    disturbances,
+    failing,
+    flight_environment,
+    initial_conditions,
+    orbit_dispersion,
+    tachometer,
+)
 from css_sim.failing import Failing, fault_outputs
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds

@@ -8,8 +8,8 @@ from sensor_msgs.msg import Imu
 
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
-from css_common.kernel import typed_call
 from css_common.fault_lines import Units
+from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
@@ -35,7 +35,7 @@ class Gyro(Component):
     shared = ()
     parameters = (*gyro.PARAMETERS, *latency.PARAMETERS, *failing.PARAMETERS)
     fault_kinds = axis_faults.GYRO_KINDS
-    _failing: Failing | None = None
+    _failing = Failing(())  # of a node that has not begun
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:

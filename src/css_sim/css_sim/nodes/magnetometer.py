@@ -38,7 +38,7 @@ class Magnetometer(Component):
     shared = ("magnetometer",)
     parameters = (*magnetometer.PARAMETERS, *latency.PARAMETERS, *failing.PARAMETERS)
     fault_kinds = axis_faults.MAGNETOMETER_KINDS
-    _failing: Failing | None = None
+    _failing = Failing(())  # of a node that has not begun
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -46,7 +46,10 @@ class Magnetometer(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("field", "mag/field", MagneticField, divider=values[FIELD_DIVIDER]), *fault_outputs(name, values))
+        return (
+            Output("field", "mag/field", MagneticField, divider=values[FIELD_DIVIDER]),
+            *fault_outputs(name, values),
+        )
 
     @classmethod
     def fault_units(cls, values: Values) -> Units:
