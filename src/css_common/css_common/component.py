@@ -16,6 +16,7 @@ from css_common.epochs import mission_epoch
 from css_common.fault_lines import FaultKind, Units
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
+from css_common.sections import DURATION, EPOCH
 from css_common.shared_sections import conflicts, section_table
 
 if TYPE_CHECKING:
@@ -126,6 +127,7 @@ class Component:
     parameters: ClassVar[Table] = ()
     fault_kinds: ClassVar[tuple[FaultKind, ...]] = ()
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
+    _needed_by_host: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
@@ -159,6 +161,11 @@ class Component:
     def needed(cls, values: Values) -> Iterable[str]:
         """Names of parameters without a default that it cannot do without; they have an example in their table."""
         return ()
+
+    @classmethod
+    def asked_for(cls, values: Values) -> Iterable[str]:
+        """Names of all parameters without a default that it or its host cannot do without."""
+        return dict.fromkeys((*cls.needed(values), *cls._needed_by_host))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
@@ -221,6 +228,7 @@ class Plant(Component):
 
     finished: bool = False
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io", "lockstep")
+    _needed_by_host: ClassVar[tuple[str, ...]] = (EPOCH.name, DURATION.name)
 
     @classmethod
     def fastest_start(cls, values: Values) -> float:
@@ -241,7 +249,7 @@ class Plant(Component):
 
 def missing_values(component_type: type[Component], values: Values) -> Iterator[str]:
     """What a component needs and has not been given, one message each."""
-    return missing(component_type.table(), values, component_type.needed(values))
+    return missing(component_type.table(), values, component_type.asked_for(values))
 
 
 def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:

@@ -81,6 +81,8 @@ def _line(mission: Mission, node: Node, finding: Finding) -> str:
 
 
 def _what_is_too_late(mission: Mission) -> Iterator[str]:
+    if not mission.steps:
+        return
     last = (mission.steps - 1) * mission.values.mission.period
     for word, scripted in (("event", mission.events), ("fault", mission.faults)):
         for one in scripted:

@@ -70,6 +70,8 @@ class Surroundings(NamedTuple):
     states: np.ndarray  # (K,) of STATE
     sky: np.ndarray  # (K,) of SKY, what the Sun estimator's own models say; (1,) when it has none
     sky_light: np.ndarray  # (K, 192) light of the Earth by them; (1, 192) when it predicts none
+    attitude_sky: np.ndarray  # (K,) of SKY, what an attitude filter that is aided so says; (1,) without one
+    attitude_sky_light: np.ndarray  # (K, 192) light of the Earth by it; (1, 192) when it predicts none
     references: np.ndarray  # (K,) of REFERENCE, what the attitude filter's models say; (0,) without one
     predicted_light: np.ndarray  # (K, 192) patches of light by them; (1, 192) when no filter takes albedo off
     light: np.ndarray  # (K, 192) patches of light of the Earth; (1, 192) when each case has its own Earth, or none
@@ -166,6 +168,7 @@ class SurroundingsTables:
         plant: values of the node that owns the truth (its orbit, shadow and field).
         heading: values of the Sun estimator that flies (its own models); None: none flies.
         attitude: values of the attitude filter that flies (its own models); None: none flies.
+        aided: values of an attitude filter that is aided as Sun estimators are, in the place of `attitude`.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
@@ -178,6 +181,7 @@ class SurroundingsTables:
         plant: Values,
         heading: Values | None,
         attitude: Values | None,
+        aided: Values | None,
         reflectivity: np.ndarray | None,
         own_earth: bool = False,
         field: bool = True,
@@ -186,6 +190,7 @@ class SurroundingsTables:
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field, orbit)
         self._sky: FlightSky | None = None if heading is None else flight_sky.flight_sky(heading)
+        self._attitude_sky: FlightSky | None = None if aided is None else flight_sky.flight_sky(aided)
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
@@ -233,15 +238,16 @@ class SurroundingsTables:
             _tabulate_views(states, views, *grid.shape)
         elif grid is not None and has_light:
             _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
-        return Surroundings(states, *self._skies(first, count), *self._modelled(first, count), light, views)
+        skies = (*self._skies(self._sky, first, count), *self._skies(self._attitude_sky, first, count))
+        return Surroundings(states, *skies, *self._modelled(first, count), light, views)
 
-    def _skies(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """What the Sun estimator's models say, and the light that they predict."""
-        rows = 1 if self._sky is None else count
+    def _skies(self, sky: FlightSky | None, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """What an estimator's models say, and the light that they predict."""
+        rows = 1 if sky is None else count
         skies = np.zeros(rows, SKY)
-        light = aligned_table(rows if self._sky is not None and self._sky.has_light else 1, len(new_light()))
+        light = aligned_table(rows if sky is not None and sky.has_light else 1, len(new_light()))
         for k in range(rows):
-            *row, now = flight_sky.sky_at(self._sky, self._epoch_ns + (first + k) * self._period_ns)
+            *row, now = flight_sky.sky_at(sky, self._epoch_ns + (first + k) * self._period_ns)
             skies[k] = tuple(row)
             if k < len(light):
                 light[k] = now

@@ -28,7 +28,7 @@ def values_with(faults=(), **random_faults):
 
 def same(faults, others):
     """Whether two tables say the same; what none has held yet is NaN in both."""
-    return all(np.array_equal(faults[n], others[n], equal_nan=n == "held") for n in FAULT.names)
+    return all(np.array_equal(faults[n], others[n], equal_nan=n == "held") for n in FAULT.names or ())
 
 
 def faults_with(*texts, key=KEY, **random_faults):

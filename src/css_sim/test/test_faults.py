@@ -3,6 +3,7 @@
 
 import math
 import re
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from faults import values_of
 from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
-from css_common.codec import codec_of
+from css_common.codec import Sample, codec_of
 from css_common.fault_lines import parse_line
 from css_common.random_streams import random_key
 from css_msgs.msg import Faults, SpacecraftState
@@ -31,7 +32,7 @@ SI = {
 }  # fmt: skip
 
 # What a kind makes of x, `steps` cycles after its begin, with its values in SI: known without a draw.
-EXPECTED = {
+EXPECTED: dict[str, Callable[..., float]] = {
     "dead": lambda x, steps: 0.0,
     "stuck": lambda x, steps, level: level,
     "drifting": lambda x, steps, rate: x + rate * PERIOD * steps,
@@ -42,14 +43,14 @@ EXPECTED = {
     "stuck_high": lambda x, steps: 1e30,
     "wrap": lambda x, steps: 1e30 if x < 0.0 else x,
 }
-FACTOR = {"scaled": lambda x, steps, factor: factor * x}  # whose values have no unit
+FACTOR: dict[str, Callable[..., float]] = {"scaled": lambda x, steps, factor: factor * x}  # whose values have no unit
 DRAWN = {"noisy", "spikes", "intermittent", "stuck_random"}
 OF_THEIR_OWN = {"frozen", "silent", "swapped", "shadowed", "friction"}
 NOT_OF_COMMANDS = {("wheel", "dead"), ("wheel", "saturated")}
 
 
 def lines_of(*lines, kinds=KINDS, key=KEY):
-    return rows(case_faults(lines, kinds, UNITS, key, PERIOD))
+    return rows(case_faults(list(lines), kinds, UNITS, key, PERIOD))
 
 
 def line(kind, unit=1, times="from 1"):
@@ -161,7 +162,9 @@ def outputs(*faults, **changes):
     truth = codec_of(SpacecraftState).sample(
         array.epoch_ns, "eci", sun_n=np.array([0.6, 0.0, 0.8]), solar_flux=1.0, illumination=1.0
     )
-    return array.cycle(array.epoch_ns, {"truth": truth})["voltages"].voltages
+    voltages = array.cycle(array.epoch_ns, {"truth": truth})["voltages"]
+    assert isinstance(voltages, Sample)
+    return voltages.voltages
 
 
 def test_a_shadow_takes_light_and_leaves_the_offset():

@@ -7,7 +7,8 @@ The model of cell i with the normal n_i,
     light_i = flux max(0, n_i.s) seen_i + a_i (1 + EARTH) + c a_i u_i,
 
 R being the response, a_i the light of the mean Earth at the estimated attitude, u_i what clouds add to it in units of
-c a_i. Where the Earth is not predicted a_i is half of its largest, and its error is white noise.
+c a_i, gain_i and n_i those of `calibration` where cells are calibrated in flight. Where the Earth is not predicted a_i
+is half of its largest, and its error is white noise.
 
 Which cells see the Sun follows from the estimate. Its error decides for which of them that is sure: of the others, next
 to the edge of a view, those enter that are too bright for an Earth. A reading that the model explains worse than
@@ -24,6 +25,13 @@ from css_common.kernel import kernel
 from css_common.vectors import Vec3, add, cross, dot, matmul, multiply, multiply_transposed, norm, scale
 from css_environment.albedo import albedo_output
 from css_environment.albedo_slope import albedo_slopes
+from css_estimation.sun_filter.calibration import (
+    PER_CELL,
+    calibrated,
+    correct_calibration,
+    corrected_states,
+    first_state,
+)
 from css_estimation.sun_filter.memory import (
     COMMON,
     EARTH,
@@ -131,6 +139,7 @@ def read_cells(
     flux: float,
     more_noise: float,
     earth_known: bool,
+    learns: bool,
     light,
     states: int,
     x,
@@ -143,6 +152,7 @@ def read_cells(
         flux: of the Sun [-], 1 at 1 AU.
         more_noise: variance of each cell [-] beside that of its noise.
         earth_known: `light` is that of the Earth; else it is unknown.
+        learns: the states of calibration are corrected.
         states: how many of the states are in use.
         m: room.
     """
@@ -153,7 +163,9 @@ def read_cells(
         albedo_slopes(light, p.cells, p.screen, p.cos_half_view, dcm_bn, m.earth_slopes)
     sun_b = multiply(dcm_bn, sun_n)
     sigma = heading_sigma(covariance, sun_n)
-    margin = min(_MARGIN_LEAST + _MARGIN_BY_SIGMA * sigma, _MARGIN_MOST)
+    margin = min(_MARGIN_LEAST + _MARGIN_BY_SIGMA * sigma, _MARGIN_MOST) + p.calibration.margin
+    calibrates = p.calibration.per_cell > 0
+    corrected = corrected_states(cells, states, learns)
     forget(covariance, COMMON, 1, p.errors.common)
     gained, correction = m.work[0], m.work[1]
     for j in range(states):
@@ -171,20 +183,24 @@ def read_cells(
         cell = p.cells[i]
         v -= cell.dark
         cosine, seen, doubtful = view_of(p, i, sun_b, margin)
+        gain, normal_b, by_tilt1, by_tilt2 = cell.gain, (cell.nx, cell.ny, cell.nz), 0.0, 0.0
+        if calibrates:
+            relative, normal_b, by_tilt1, by_tilt2 = calibrated(cells, i, x, normal_b, sun_b)
+            gain, cosine = gain * relative, dot(normal_b, sun_b)
         mean_light = m.earth[i] if earth_known else 0.0
         albedo = earth_factor * mean_light if earth_known else 0.5 * p.earth.unknown
         if doubtful:
             # the reading tells on which side of the edge the Sun is, where no Earth could
             sunlight = flux * max(cosine, p.cos_half_view)
-            seen = sunlight > p.earth.largest and v > cell.gain * scale_now * (albedo + 0.5 * sunlight)
+            seen = sunlight > p.earth.largest and v > gain * scale_now * (albedo + 0.5 * sunlight)
             if not seen:
                 likelihood -= 0.5 * (1.0 + math.log(p.errors.noise))
                 continue
         cloud = p.earth.clouds * mean_light
-        cloud_state = GAIN + cells + i
+        cloud_state, own = GAIN + cells + i, first_state(cells) + PER_CELL * i
         received = albedo + (cloud * x[X_GAIN + cells + i] if earth_known else 0.0)
         # normals in n turn with the error, d(n) = theta x n
-        across = cross(multiply_transposed(dcm_bn, (cell.nx, cell.ny, cell.nz)), sun_n)
+        across = cross(multiply_transposed(dcm_bn, normal_b), sun_n)
         share, spread = (1.0 if seen else 0.0), 0.0
         sunlit = max(cosine, 0.0)
         if p.cos_half_view < _SMALLEST_STEP and cell.side == 0.0:
@@ -193,7 +209,7 @@ def read_cells(
         if seen:
             received += flux * sunlit
         output, slope = respond(p.response, received)
-        factor = cell.gain * (1.0 + x[X_GAIN + i])
+        factor = gain * (1.0 + x[X_GAIN + i])
         expected = factor * scale_now * output
         if not seen and expected < dark and v < _SURELY_LIT * dark:
             # no correction, but as good an explanation as that of a filter which has the cell lit
@@ -210,13 +226,23 @@ def read_cells(
             by_theta = add(by_theta, scale(slope * earth_factor, by_earth_n))
         by_scale = factor * p.response.scale * output
         by_earth = slope * mean_light
-        by_gain = cell.gain * scale_now * output
+        by_gain = gain * scale_now * output
         by_cloud = slope * cloud
+        by_relative = 0.0
+        if calibrates:
+            # the Sun alone calibrates: nobody knows so well how bright the Earth is on a cell
+            sunlight = flux * slope * share if seen else 0.0
+            by_tilt1, by_tilt2 = sunlight * by_tilt1, sunlight * by_tilt2
+            by_relative = cell.gain * (1.0 + x[X_GAIN + i]) * scale_now * output if seen else 0.0
+            by_scale = by_scale if seen else 0.0
         innovation = v - expected
         innovation -= by_theta[0] * correction[0] + by_theta[1] * correction[1] + by_theta[2] * correction[2]
         innovation -= by_scale * correction[SCALE] + expected * correction[COMMON] + by_gain * correction[GAIN + i]
         if earth_known:
             innovation -= by_earth * correction[EARTH] + by_cloud * correction[cloud_state]
+        if calibrates:
+            innovation -= by_relative * correction[own] + by_tilt1 * correction[own + 1]
+            innovation -= by_tilt2 * correction[own + 2]
         noise = p.errors.noise + more_noise + slope * slope * flux * flux * spread
         for j in range(states):
             total = by_theta[0] * covariance[j, 0] + by_theta[1] * covariance[j, 1] + by_theta[2] * covariance[j, 2]
@@ -224,11 +250,16 @@ def read_cells(
             total += by_gain * covariance[j, GAIN + i]
             if earth_known:
                 total += by_earth * covariance[j, EARTH] + by_cloud * covariance[j, cloud_state]
+            if calibrates:
+                total += by_relative * covariance[j, own] + by_tilt1 * covariance[j, own + 1]
+                total += by_tilt2 * covariance[j, own + 2]
             gained[j] = total
         variance = noise + by_theta[0] * gained[0] + by_theta[1] * gained[1] + by_theta[2] * gained[2]
         variance += by_scale * gained[SCALE] + expected * gained[COMMON] + by_gain * gained[GAIN + i]
         if earth_known:
             variance += by_earth * gained[EARTH] + by_cloud * gained[cloud_state]
+        if calibrates:
+            variance += by_relative * gained[own] + by_tilt1 * gained[own + 1] + by_tilt2 * gained[own + 2]
         squared = innovation * innovation / variance
         likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(variance))
         if squared > p.convergence.gate and sigma < _CONVERGED:
@@ -239,13 +270,29 @@ def read_cells(
         nis += squared
         dof += 1
         used |= 1 << i
-        for j in range(states):
-            share = gained[j] / variance
-            correction[j] += share * innovation
-            for k in range(states):
-                covariance[j, k] -= share * gained[k]
+        absorb(gained, innovation, variance, corrected, states, correction, covariance)
     correct(p, x, correction, states)
     return CellReading(nis, dof, used, refused, contrary, likelihood, sigma)
+
+
+@kernel
+def absorb(gained, innovation: float, variance: float, corrected: int, states: int, correction, covariance) -> None:
+    """Takes one reading into correction and covariance.
+
+    Args:
+        gained: covariance of the states with the reading.
+        variance: of the innovation.
+        corrected: so many of the states in use are corrected; the others have no gain, they are considered (Schmidt).
+    """
+    for j in range(corrected):
+        share = gained[j] / variance
+        correction[j] += share * innovation
+        for k in range(states):
+            covariance[j, k] -= share * gained[k]
+    for j in range(corrected, states):
+        share = gained[j] / variance
+        for k in range(corrected):
+            covariance[j, k] -= share * gained[k]
 
 
 @kernel
@@ -266,3 +313,4 @@ def correct(p: SunFilterParameters, x, correction, states: int) -> None:
         x[X_EARTH] = max(_LEAST_EARTH, x[X_EARTH] + correction[EARTH])
         for i in range(cells):
             x[X_GAIN + cells + i] += correction[GAIN + cells + i]
+        correct_calibration(p.calibration, cells, x, correction)
