@@ -140,7 +140,7 @@ def test_cases_of_a_study_draw_their_own_faults():
     mission = mission_with(text, duration=8.0)
     flight = MissionFlight(mission)
     cases, _ = flight.cases(np.arange(40))
-    rows = cases.faults.actuators[:, 0]
+    rows = cases.faults[:, 0]
     acting = rows["first_step"] < effects.NEVER
     assert 8 < np.count_nonzero(acting) < 32
     assert set(rows["unit"][acting]) == {0, 1, 2, 3}

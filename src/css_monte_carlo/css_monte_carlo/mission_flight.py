@@ -23,7 +23,7 @@ from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
 from css_monte_carlo.case_tallies import step_marks
-from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, FaultTables, Vehicle
+from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables, aligned_table
@@ -42,7 +42,8 @@ from css_sim import (
     sun_cells,
     tachometer,
 )
-from css_sim.faults import CaseFault, rows, with_held
+from css_sim.fault_effects import GYRO, MAGNETOMETER
+from css_sim.faults import rows, with_held
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
 from css_sim.spacecraft import spacecraft
@@ -134,7 +135,8 @@ class MissionFlight:
             done = [event for event, begin in zip(self.mission.events, begins, strict=True) if begin <= first]
             before = cases
             cases = cases._replace(faults=self._faults(done, cases.numbers))
-            _go_on_holding(cases.faults, before.faults, self._begun_anew(done, first))
+            for now, then in zip(cases.faults, before.faults, strict=True):
+                with_held(now, then, self._begun_anew(done, first))
             yield Stretch(first, end, self._vehicle(done), cases)
 
     def cases(self, numbers: np.ndarray, guess_deg: float = 0.0) -> tuple[Cases, list[CaseState]]:
@@ -185,9 +187,9 @@ class MissionFlight:
             rates=np.zeros((len(keys), 3)),
             cells=cells,
             faults=self._faults([], numbers),
-            faulty_wheels=np.stack([body.wheels for body in bodies]),
-            faulty_torque=np.zeros_like(momentum),
-            faulty_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
+            felt_wheels=np.stack([body.wheels for body in bodies]),
+            felt_torque=np.zeros_like(momentum),
+            felt_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             reflectivity=earths,
             cloud_fields=fields,
             cloud_motion=motions,
@@ -295,28 +297,31 @@ class MissionFlight:
         plant = self._plant.values
         return self._magnetometer is not None or plant.rods.fitted or initial_conditions.has_dipole(plant)
 
-    def _faults(self, done: list[Event], numbers: np.ndarray) -> FaultTables:
-        """The faults of cases (C,) once scripted changes have been made."""
+    def _faults(self, done: list[Event], numbers: np.ndarray) -> np.ndarray:
+        """The faults (C, F) of cases (C,) once scripted changes have been made."""
         array, plant = self._values_after(self._array, done), self._values_after(self._plant, done)
-        keys = [self._key(int(number)) for number in numbers]
-
-        def of_axes(sensor: Node | None, sort: str) -> list[list[CaseFault]]:
-            if sensor is None:
-                return [[] for _ in keys]
-            values = self._values_after(sensor, done)
-            return [axis_faults.case_faults(values, sort, key) for key in keys]
-
-        return FaultTables(
-            cells=_stacked([cell_faults.case_faults(array, key) for key in keys]),
-            gyro=_stacked(of_axes(self._gyro, "gyro")),
-            magnetometer=_stacked(of_axes(self._magnetometer, "magnetometer")),
-            actuators=_stacked([actuator_faults.case_faults(plant, key) for key in keys]),
+        of_axes = [
+            (self._values_after(sensor, done), sort)
+            for sensor, sort in ((self._gyro, "gyro"), (self._magnetometer, "magnetometer"))
+            if sensor is not None
+        ]
+        return np.stack(
+            [
+                np.concatenate(
+                    [
+                        rows(cell_faults.case_faults(array, key)),
+                        rows(actuator_faults.case_faults(plant, key)),
+                        *(rows(axis_faults.case_faults(values, sort, key)) for values, sort in of_axes),
+                    ]
+                )
+                for key in (self._key(int(number)) for number in numbers)
+            ]
         )
 
-    def _begun_anew(self, done: list[Event], step: int) -> set[str]:
-        """Which of `FaultTables` are of a sensor that is switched on at a step and knows nothing of before."""
-        sensors = {"gyro": self._gyro, "magnetometer": self._magnetometer}
-        return {name for name, sensor in sensors.items() if step > 0 and self._on_since(sensor, done) == step}
+    def _begun_anew(self, done: list[Event], step: int) -> set[int]:
+        """Sorts of faulty units whose sensor is switched on at a step and knows nothing of before."""
+        sensors = {GYRO: self._gyro, MAGNETOMETER: self._magnetometer}
+        return {sort for sort, sensor in sensors.items() if step > 0 and self._on_since(sensor, done) == step}
 
     def _key(self, case: int) -> RandomKey:
         return random_key(self.mission.values.mission.seed, case)
@@ -326,19 +331,6 @@ class MissionFlight:
         canonical = dict(node.canonical)
         canonical |= {e.parameter: e.value for e in done if e.node == node.name and e.action == "set"}
         return shaped_values(node.component.table(), canonical)
-
-
-def _stacked(of_cases: list[list[CaseFault]]) -> np.ndarray:
-    """Table (C, F) of the faults of cases."""
-    return np.stack([rows(of_case) for of_case in of_cases])
-
-
-def _go_on_holding(tables: FaultTables, before: FaultTables, anew: set[str]) -> None:
-    """Lets frozen units stay where they were, but for those of tables `anew`."""
-    for name, now, then in zip(FaultTables._fields, tables, before, strict=True):
-        if name not in anew:
-            for of_case, earlier in zip(now, then, strict=True):
-                with_held(of_case, earlier)
 
 
 def _values(node: Node | None) -> Values | None:

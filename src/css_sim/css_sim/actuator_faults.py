@@ -14,18 +14,21 @@ from css_sim import faults
 from css_sim.fault_effects import DEAD, FRICTION, ROD, SLOW, WHEEL, acts, spoil
 from css_sim.fault_kinds import kinds_of
 from css_sim.faults import CaseFault
-from css_sim.rigid_body import WHEEL as WHEEL_FORM
 
 KINDS = kinds_of("wheel", "rod", "tachometer")
 
 
-class ActuatorFaults(NamedTuple):
-    """Faults of one case, with room for what they make of its actuators."""
+class Felt(NamedTuple):
+    """Room for what faults make of the actuators of one case: what its spacecraft then is and is commanded."""
 
-    faults: np.ndarray  # (F,) of fault_effects.FAULT; of tachometers too
-    wheels: np.ndarray  # (N,) of rigid_body.WHEEL, written
-    torque: np.ndarray  # (N,) [N m] written
-    dipole: np.ndarray  # (M,) [A m^2] written
+    wheels: np.ndarray  # (N,) of rigid_body.WHEEL
+    torque: np.ndarray  # (N,) [N m]
+    dipole: np.ndarray  # (M,) [A m^2]
+
+
+def new_felt(wheels: np.ndarray, rods: int) -> Felt:
+    """Room for a spacecraft with so many rods and these wheels (N,) of rigid_body.WHEEL."""
+    return Felt(wheels.copy(), np.zeros(len(wheels)), np.zeros(rods))
 
 
 def units(values: Values) -> Units:
@@ -43,26 +46,27 @@ def case_faults(values: Values, key: RandomKey) -> list[CaseFault]:
     return faults.case_faults(values[FAULTS], KINDS, units(values), key, values[PERIOD])
 
 
-def with_room(table: np.ndarray, wheels: int, rods: int) -> ActuatorFaults:
-    """Faults (F,) of FAULT of a spacecraft with so many wheels and rods."""
-    return ActuatorFaults(table, np.zeros(wheels, WHEEL_FORM), np.zeros(wheels), np.zeros(rods))
-
-
 @kernel
-def spoil_actuators(p: ActuatorFaults, key: RandomKey, step: int, wheels, wheel_command, rod_command) -> None:
-    """Writes the wheels and the commands of a control cycle as faults make them into the room for them."""
+def spoil_actuators(faults, key: RandomKey, step: int, wheels, torque, dipole, felt: Felt) -> None:
+    """Writes what faults (F,) of FAULT make of wheels and commands at a control cycle into the room for it.
+
+    Args:
+        wheels: (N,) of rigid_body.WHEEL, as they were built.
+        torque: (N,) commanded [N m].
+        dipole: (M,) commanded [A m^2].
+    """
     for i in range(wheels.shape[0]):
-        _copy(wheels[i], p.wheels[i])
-        p.torque[i] = wheel_command[i]
-    for i in range(rod_command.shape[0]):
-        p.dipole[i] = rod_command[i]
-    spoil(p.faults, WHEEL, key, step, p.torque)
-    spoil(p.faults, ROD, key, step, p.dipole)
-    for k in range(p.faults.shape[0]):
-        fault = p.faults[k]
+        _copy(wheels[i], felt.wheels[i])
+        felt.torque[i] = torque[i]
+    for i in range(dipole.shape[0]):
+        felt.dipole[i] = dipole[i]
+    spoil(faults, WHEEL, key, step, felt.torque)
+    spoil(faults, ROD, key, step, felt.dipole)
+    for k in range(faults.shape[0]):
+        fault = faults[k]
         if fault.sort != WHEEL or not acts(fault, step):
             continue
-        wheel = p.wheels[fault.unit]
+        wheel = felt.wheels[fault.unit]
         if fault.kind == DEAD:
             wheel.max_torque = 0.0
         elif fault.kind == SLOW:

@@ -29,6 +29,7 @@ FAULT = np.dtype(
         ("sort", np.int64),
         ("unit", np.int64),  # number of the cell, axis, wheel or rod
         ("kind", np.int64),
+        ("index", np.int64),  # of its random draws
         ("value", np.float64),  # in SI and control cycles
         ("second", np.float64),
         ("first_step", np.int64),  # first control cycle of the fault
@@ -48,27 +49,21 @@ def stream_of(sort: int) -> int:
 
 
 @kernel
-def index_of(sort: int, place: int) -> int:
-    """Index of the draws of the fault at a place among those of its node."""
-    return (sort << 16) + place
-
-
-@kernel
 def acts(fault, step: int) -> bool:
     """Whether a fault acts at a control cycle."""
     return fault.first_step <= step < fault.end_step
 
 
 @kernel
-def faulty(fault, key: RandomKey, stream: int, step: int, index: int, x: float) -> float:
+def faulty(fault, key: RandomKey, stream: int, step: int, x: float) -> float:
     """What a fault that acts makes of a value.
 
     Args:
         fault: of FAULT; one that is frozen takes note of the value.
-        stream, index: of the random draws of this cycle.
+        stream: of the random draws of this cycle.
         x: reading or command, in the units of `fault.value`.
     """
-    kind = fault.kind
+    kind, index = fault.kind, fault.index
     if kind == DEAD:
         return 0.0
     if kind == STUCK:
@@ -107,18 +102,18 @@ def faulty(fault, key: RandomKey, stream: int, step: int, index: int, x: float) 
 
 
 @kernel
-def any_acts(faults, kind: int, step: int) -> bool:
-    """Whether some fault (F,) of a kind acts at a control cycle."""
-    for k in range(faults.shape[0]):  # noqa: SIM110 - no generators in kernels
-        if faults[k].kind == kind and acts(faults[k], step):
+def any_acts(faults, sort: int, kind: int, step: int) -> bool:
+    """Whether some fault (F,) of a kind acts on a unit of a sort at a control cycle."""
+    for k in range(faults.shape[0]):
+        if faults[k].sort == sort and faults[k].kind == kind and acts(faults[k], step):
             return True
     return False
 
 
 @kernel
-def is_silent(faults, step: int) -> bool:
-    """Whether faults (F,) keep a sensor from giving any reading at a control cycle."""
-    return faults.shape[0] > 0 and any_acts(faults, SILENT, step)
+def is_silent(faults, sort: int, step: int) -> bool:
+    """Whether faults (F,) keep a sensor of a sort from giving any reading at a control cycle."""
+    return faults.shape[0] > 0 and any_acts(faults, sort, SILENT, step)
 
 
 @kernel
@@ -139,7 +134,7 @@ def spoil(faults, sort: int, key: RandomKey, step: int, values) -> None:
             if other < values.shape[0]:
                 values[i], values[other] = values[other], values[i]
         else:
-            values[i] = faulty(fault, key, stream_of(sort), step, index_of(sort, k), values[i])
+            values[i] = faulty(fault, key, stream_of(sort), step, values[i])
 
 
 @kernel
@@ -150,11 +145,10 @@ def spoil_axes(faults, sort: int, key: RandomKey, step: int, vector: Vec3) -> Ve
         fault = faults[k]
         if fault.sort != sort or not acts(fault, step):
             continue
-        index = index_of(sort, k)
         if fault.unit == 0:
-            x = faulty(fault, key, stream_of(sort), step, index, x)
+            x = faulty(fault, key, stream_of(sort), step, x)
         elif fault.unit == 1:
-            y = faulty(fault, key, stream_of(sort), step, index, y)
+            y = faulty(fault, key, stream_of(sort), step, y)
         else:
-            z = faulty(fault, key, stream_of(sort), step, index, z)
+            z = faulty(fault, key, stream_of(sort), step, z)
     return (x, y, z)

@@ -8,7 +8,7 @@ changes no other.
 import math
 import zlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -58,9 +58,10 @@ def step_of(time_s: float, period: float) -> int:
 
 
 def rows(faults: Sequence[CaseFault]) -> np.ndarray:
-    """Array (F,) of FAULT."""
+    """Array (F,) of FAULT of the faults of one node, whose draws hang on their places among them."""
     table = np.zeros(len(faults), FAULT)
-    for row, fault in zip(table, faults, strict=True):
+    for place, (row, fault) in enumerate(zip(table, faults, strict=True)):
+        row["index"] = (fault.sort << 16) + place
         row["sort"], row["unit"], row["kind"] = fault.sort, fault.unit, fault.kind
         row["value"], row["second"] = (*fault.scaled, 0.0, 0.0)[:2]
         row["first_step"], row["end_step"] = fault.first_step, fault.end_step
@@ -68,9 +69,13 @@ def rows(faults: Sequence[CaseFault]) -> np.ndarray:
     return table
 
 
-def with_held(table: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Faults (F,) of FAULT, the frozen ones among them with what they held `before` if they were there."""
-    known = {_identity(row): row["held"] for row in before if not math.isnan(row["held"])}
+def with_held(table: np.ndarray, before: np.ndarray, anew: Collection[int] = ()) -> np.ndarray:
+    """Faults (F,) of FAULT, the frozen ones among them with what they held `before` if they were there.
+
+    Args:
+        anew: sorts of units that know nothing of before.
+    """
+    known = {_identity(row): row["held"] for row in before if row["sort"] not in anew}
     for row in table:
         row["held"] = known.get(_identity(row), math.nan)
     return table

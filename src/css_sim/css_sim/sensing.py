@@ -15,7 +15,7 @@ from css_common.vectors import Mat3, Vec3, multiply
 from css_environment.albedo import albedo_output
 from css_environment.ephemeris import EnvironmentState
 from css_sim import gyro, latency, magnetometer, sun_cells
-from css_sim.fault_effects import is_silent
+from css_sim.fault_effects import GYRO, MAGNETOMETER, is_silent
 from css_sim.gyro import Gyro, GyroErrors
 from css_sim.latency import Latency, Moment, remember, sensed
 from css_sim.magnetometer import Magnetometer
@@ -47,7 +47,7 @@ class CellsOfCase(NamedTuple):
     """The cells of one case, with room for the light of the Earth on them."""
 
     cells: np.ndarray  # (N,) of cell_errors.CELL
-    faults: np.ndarray  # (F,) of fault_effects.FAULT
+    faults: np.ndarray  # (F,) of fault_effects.FAULT, where all sensors are those of their sorts
     albedo: np.ndarray  # (N,) written
     work: np.ndarray  # (224,) of `css_environment.albedo.new_workspace`, written
 
@@ -58,9 +58,7 @@ class SensorsOfCase(NamedTuple):
     key: RandomKey
     cells: CellsOfCase
     gyro: GyroErrors
-    gyro_faults: np.ndarray  # (F,) of fault_effects.FAULT
     field_bias_b: Vec3  # [T]
-    field_faults: np.ndarray  # (F,) of fault_effects.FAULT
     lags: Vec3  # [cycles] of cells, gyro and magnetometer
     history: np.ndarray  # (L,) of latency.MOMENT, written
 
@@ -147,13 +145,13 @@ def sense(
     sense_cells(p.cells, case.cells, case.key, step, dcm_bn, sun_b, intensity, p.earthlit, light, voltages_out)
     bias_b = gyro.bias_at(p.gyro, case.gyro, case.key, step)
     gyro_b, field_b = _NOTHING, _NOTHING
-    gyro_speaks = p.gyro_on and not is_silent(case.gyro_faults, step)
+    gyro_speaks = p.gyro_on and not is_silent(case.cells.faults, GYRO, step)
     if gyro_speaks:
-        gyro_b = gyro.read(p.gyro, case.gyro, bias_b, case.gyro_faults, case.key, step, omega_bn_b)
+        gyro_b = gyro.read(p.gyro, case.gyro, bias_b, case.cells.faults, case.key, step, omega_bn_b)
     measured = p.field_divider > 0 and p.magnetometer_on and step % p.field_divider == 0
-    measured = measured and not is_silent(case.field_faults, step)
+    measured = measured and not is_silent(case.cells.faults, MAGNETOMETER, step)
     if measured:
         field_b = sense_field(
-            p.magnetometer, case.field_bias_b, case.field_faults, case.key, step, field_dcm_bn, field_n
+            p.magnetometer, case.field_bias_b, case.cells.faults, case.key, step, field_dcm_bn, field_n
         )
     return Readings(gyro_b, gyro_speaks, field_b, measured, bias_b)

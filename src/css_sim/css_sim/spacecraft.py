@@ -13,7 +13,6 @@ from css_common.sections import ROD_AXES, ROD_MAX_DIPOLE, RODS_FITTED
 from css_common.vectors import Vec3, add, cross, multiply
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances
-from css_sim.actuator_faults import ActuatorFaults, spoil_actuators
 from css_sim.disturbances import Disturbances, disturbance_torque
 from css_sim.initial_conditions import dispersed_body, dispersed_dipole, has_dipole
 from css_sim.rigid_body import RigidBody, RotationState, propagate
@@ -60,9 +59,6 @@ def rod_dipole(axes_b, max_dipole: float, command) -> Vec3:
 @kernel
 def advance(
     p: Spacecraft,
-    faults: ActuatorFaults,
-    key: RandomKey,
-    step: int,
     state: RotationState,
     wheel_momentum,
     wheel_command,
@@ -76,8 +72,6 @@ def advance(
     Torques of the environment are those at the start of the cycle.
 
     Args:
-        faults: of wheels and rods in this case.
-        key, step: what fixes the draws of faults.
         wheel_momentum: (N,) [N m s], advanced in place.
         wheel_command: (N,) motor torques [N m].
         rod_command: (M,) dipoles [A m^2]; M is 0 without rods.
@@ -88,11 +82,6 @@ def advance(
     Returns:
         Rotation state, mask of torque-limited wheels, mask of speed-limited wheels.
     """
-    body = p.body
-    if faults.faults.shape[0] > 0:
-        spoil_actuators(faults, key, step, body.wheels, wheel_command, rod_command)
-        body = RigidBody(body.inertia, body.inertia_inverse, faults.wheels, body.substeps)
-        wheel_command, rod_command = faults.torque, faults.dipole
     torque_b = (0.0, 0.0, 0.0)
     if p.disturbed or p.rod_axes_b.shape[0] > 0:
         dcm_bn = mrp_to_dcm(state.sigma_bn)
@@ -101,4 +90,4 @@ def advance(
         if p.rod_axes_b.shape[0] > 0:
             field_b = multiply(dcm_bn, environment.field_n)
             torque_b = add(torque_b, cross(rod_dipole(p.rod_axes_b, p.rod_max_dipole, rod_command), field_b))
-    return propagate(body, state, wheel_momentum, wheel_command, torque_b, dt, wheel_torque_out)
+    return propagate(p.body, state, wheel_momentum, wheel_command, torque_b, dt, wheel_torque_out)

@@ -137,7 +137,7 @@ def sample(
     """
     # the outputs hold the factors until each is used
     _draw_degradation(p, key, step, voltages_out)
-    shadowed = faults.shape[0] > 0 and any_acts(faults, SHADOWED, step)
+    shadowed = faults.shape[0] > 0 and any_acts(faults, CELL, SHADOWED, step)
     for i in range(voltages_out.shape[0]):
         cell = cells[i]
         v = albedo[i]

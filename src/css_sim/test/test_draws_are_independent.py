@@ -87,7 +87,7 @@ def cell_draws(key, nominal):
 def output_draws(key, nominal, quiet):
     """What is drawn at a step: degradation in either mode, noise, and that of a noisy cell."""
     out = np.zeros(CELLS_DRAWN)
-    noisy = np.array([(CELL, 0, NOISY, 1.0, 0.0, 0, 9, 0.0)], FAULT)
+    noisy = np.array([(CELL, 0, NOISY, 0, 1.0, 0.0, 0, 9, 0.0)], FAULT)
     light = np.ones(CELLS_DRAWN)
     variants = (
         ("loss of all", quiet._replace(degradation=0.5), NO_FAULTS, 1),

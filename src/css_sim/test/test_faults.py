@@ -16,7 +16,7 @@ from css_common.fault_lines import parse_line
 from css_common.random_streams import random_key
 from css_msgs.msg import Faults, SpacecraftState
 from css_sim import fault_effects as effects
-from css_sim.actuator_faults import spoil_actuators, with_room
+from css_sim.actuator_faults import new_felt, spoil_actuators
 from css_sim.fault_kinds import AXES, KINDS, SORTS, kinds_of
 from css_sim.faults import case_faults, rows
 from css_sim.nodes.css_array import CssArray
@@ -188,9 +188,9 @@ def test_cells_at_the_limits_of_their_converter():
 def spoiled_actuators(*lines, step=10, command=0.01):
     """Wheels and commands of a spacecraft with faults."""
     body = rigid_body(np.eye(3).ravel(), np.vstack([np.eye(3), [[0.6, 0.8, 0.0]]]), wheel_friction=(0.001, 0.0001))
-    room = with_room(lines_of(*lines), 4, 3)
-    spoil_actuators(room, KEY, step, body.wheels, np.full(4, command), np.full(3, 0.5))
-    return body.wheels, room
+    felt = new_felt(body.wheels, 3)
+    spoil_actuators(lines_of(*lines), KEY, step, body.wheels, np.full(4, command), np.full(3, 0.5), felt)
+    return body.wheels, felt
 
 
 def test_wheels_that_are_not_as_they_were_built():
@@ -215,7 +215,7 @@ def test_commands_that_wheels_and_rods_do_not_follow():
 def test_silence_is_of_the_whole_sensor():
     for sort in ("gyro", "magnetometer"):
         table = lines_of(f"{sort}.all silent from 1 to 2")
-        assert [effects.is_silent(table, step) for step in (9, 10, 19, 20)] == [False, True, True, False]
+        assert [effects.is_silent(table, SORTS[sort], step) for step in (9, 10, 19, 20)] == [False, True, True, False]
         with pytest.raises(ValueError, match=rf"expected {sort}\.all"):
             parse_line(f"{sort}.x silent", KINDS, UNITS)
 

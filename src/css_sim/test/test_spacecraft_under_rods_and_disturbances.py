@@ -12,8 +12,6 @@ from css_common.random_streams import random_key
 from css_common.sections import MISSION, RODS, SPACECRAFT, WHEELS
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances, initial_conditions
-from css_sim.actuator_faults import with_room
-from css_sim.fault_effects import NO_FAULTS
 from css_sim.rigid_body import RotationState, propagate
 from css_sim.spacecraft import advance, rod_dipole, spacecraft
 
@@ -35,9 +33,8 @@ def fly(craft, rods=(), steps=1):
     """State and wheel momenta after some cycles of 0.1 s."""
     state, momentum, applied = STATE, np.array([0.1, -0.1, 0.05, 0.0]), np.zeros(4)
     rods = np.array(rods, dtype=float)
-    sound = with_room(NO_FAULTS, len(momentum), len(rods))
-    for k in range(steps):
-        state, *_ = advance(craft, sound, KEY, k, state, momentum, COMMAND, rods, ENVIRONMENT, 0.1, applied)
+    for _ in range(steps):
+        state, *_ = advance(craft, state, momentum, COMMAND, rods, ENVIRONMENT, 0.1, applied)
     return state, momentum
 
 

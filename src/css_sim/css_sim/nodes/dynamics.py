@@ -37,6 +37,7 @@ from css_sim import (
     orbit_dispersion,
     tachometer,
 )
+from css_sim.actuator_faults import new_felt, spoil_actuators
 from css_sim.failing import Failing, fault_outputs
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
@@ -137,6 +138,7 @@ class Dynamics(Plant):
         self._torque = np.zeros(len(self._momentum))
         self._tachometer = tachometer.parameters(values)
         self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
+        self._spoil = typed_call(spoil_actuators)
         self._report = typed_call(tachometer.report)
         self._steps = round(values[DURATION] / values[PERIOD])
         self.finished = False
@@ -152,23 +154,28 @@ class Dynamics(Plant):
         return None
 
     def _take_faults(self) -> None:
-        wheels, rods = len(self._craft.body.wheels), len(self._craft.rod_axes_b)
-        self._faults = actuator_faults.with_room(self._failing.table, wheels, rods)
+        body = self._craft.body
+        self._felt = new_felt(body.wheels, len(self._craft.rod_axes_b))
+        self._faulty = self._craft._replace(body=body._replace(wheels=self._felt.wheels))
 
     def begin(self) -> Outgoing:
         return self._messages(self.epoch_ns, 0, 0)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         wheels, rods = received.get("wheels"), received.get("rods")
+        craft = self._craft
+        torque = self._wheels_at_rest if wheels is None else wheels.torque
+        dipole = self._rods_at_rest if rods is None else rods.dipole
+        if len(self._failing.table):
+            step, felt = self.step_of(stamp_ns), self._felt
+            self._spoil(self._failing.table, self._key, step, craft.body.wheels, torque, dipole, felt)
+            craft, torque, dipole = self._faulty, felt.torque, felt.dipole
         self._state, torque_limited, speed_limited = self._advance(
-            self._craft,
-            self._faults,
-            self._key,
-            self.step_of(stamp_ns),
+            craft,
             self._state,
             self._momentum,
-            self._wheels_at_rest if wheels is None else wheels.torque,
-            self._rods_at_rest if rods is None else rods.dipole,
+            torque,
+            dipole,
             self._surroundings,
             self.period_ns * 1e-9,
             self._torque,

@@ -20,7 +20,7 @@ from css_msgs.msg import SpacecraftState
 from css_sim import axis_faults, failing, gyro, latency
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
-from css_sim.fault_effects import is_silent
+from css_sim.fault_effects import GYRO, is_silent
 from css_sim.faults import CaseFault
 from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
 
@@ -77,7 +77,7 @@ class Gyro(Component):
         step = self.step_of(stamp_ns)
         omega_bn_b = self._delayed(step, omega_bn_b=vector_of(received["truth"].omega_bn_b)).omega_bn_b
         told = self._failing.told(self, stamp_ns)
-        if is_silent(self._failing.table, step):
+        if is_silent(self._failing.table, GYRO, step):
             return self._imu(stamp_ns, _ZERO, _NOTHING) | told
         rate = self._measure(self._p, self._errors, self._failing.table, self._key, step, omega_bn_b)
         return self._imu(stamp_ns, np.array(rate), self._covariance) | told

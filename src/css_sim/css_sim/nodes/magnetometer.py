@@ -20,7 +20,7 @@ from css_msgs.msg import SpacecraftState
 from css_sim import axis_faults, failing, latency, magnetometer
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
-from css_sim.fault_effects import is_silent
+from css_sim.fault_effects import MAGNETOMETER, is_silent
 from css_sim.faults import CaseFault
 from css_sim.latency import Moment
 from css_sim.sensing import sense_field
@@ -85,7 +85,7 @@ class Magnetometer(Component):
         if not self._is_due(step):
             return told
         faults = self._failing.table
-        if is_silent(faults, step):
+        if is_silent(faults, MAGNETOMETER, step):
             return self._field(stamp_ns, np.zeros(3), _NOTHING) | told
         dcm_bn = mrp_to_dcm(there.sigma_bn)
         measured = sense_field(self._p, self._bias_b, faults, self._key, step, dcm_bn, there.field_n)
