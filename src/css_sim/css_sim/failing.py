@@ -32,10 +32,12 @@ class Failing:
         table: (F,) of `fault_effects.FAULT`.
     """
 
+    _told: tuple[CaseFault, ...] | None  # those of the last message; None: nobody has told any yet
+
     def __init__(self, faults: Sequence[CaseFault], before: "Failing | None" = None) -> None:
         """Faults from the first step on, or for a node that begins anew after those that it told `before`."""
         self._faults: Sequence[CaseFault] = ()
-        self._told: tuple[CaseFault, ...] = before._told if before is not None else ()
+        self._told = before._told if before is not None else None
         self.table = NO_FAULTS
         self.take(faults)
 
@@ -46,9 +48,12 @@ class Failing:
 
     def told(self, component: Component, stamp_ns: int) -> dict[str, Sample]:
         """A message of the faults that act at a stamp, if they are others than those of the last message."""
-        if _KEY not in component.frames or not (self._faults or self._told):
+        if _KEY not in component.frames or not (self._faults or self._told or self._told is None):
             return {}
         step = component.step_of(stamp_ns)
+        if self._told is None and step == 0:
+            self._told = ()
+        # one that begins later, restarted perhaps, may follow messages that are true no more
         acting = tuple(fault for fault in self._faults if fault.first_step <= step < fault.end_step)
         if acting == self._told:
             return {}

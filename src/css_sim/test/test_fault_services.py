@@ -4,9 +4,11 @@
 import numpy as np
 import pytest
 
+from css_common.codec import Sample, codec_of
 from css_common.mission import load_mission
+from css_common.schema import shaped_values
 from css_common.testing import Bench
-from css_msgs.msg import CssVoltages, Faults, WheelState
+from css_msgs.msg import CssVoltages, Faults, SpacecraftState, WheelState
 from css_msgs.srv import ClearFault, InjectFault
 
 FLIGHT = ("mission.duration=2.0", "css_array.report_faults=true", "dynamics.report_faults=true")
@@ -101,3 +103,27 @@ def test_a_tachometer_cannot_fail_where_nobody_tells_the_true_speeds():
         answer = inject(bench, "dynamics", "tachometer.0", "scaled", [1.1])
         assert not answer.success and "report_faults" in answer.message
         assert node.component.values.faults == []
+
+
+def test_a_node_that_is_restarted_says_that_nothing_fails_any_more():
+    mission = load_mission("okeefe_2013", FLIGHT)
+    told = []
+    for begin in (0, 3):
+        array = mission.node("css_array")
+        component = array.component("css_array", array.values)
+        for step in range(begin, begin + 3):
+            stamp_ns = component.epoch_ns + step * component.period_ns
+            truth = codec_of(SpacecraftState).sample(stamp_ns, "eci", sun_n=np.array([0.0, 0.0, 1.0]))
+            sample = component.cycle(stamp_ns, {"truth": truth}).get("faults")
+            if sample is not None:
+                assert isinstance(sample, Sample)
+                told.append(sample.unit.tolist())
+            if step == 1:
+                component.tune(with_faults(array, ["cell.1 dead"]))
+    assert told == [[1], []]
+
+
+def with_faults(node, lines):
+    """Values of a node with these faults."""
+    table = node.component.table()
+    return shaped_values(table, {**node.canonical, "faults": lines})

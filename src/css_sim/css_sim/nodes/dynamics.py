@@ -139,6 +139,9 @@ class Dynamics(Plant):
         self._tachometer = tachometer.parameters(values)
         self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
         self._spoil = typed_call(spoil_actuators)
+        # compiled before the flight: faults may be injected into it
+        wheels, torque, dipole = self._craft.body.wheels, self._wheels_at_rest, self._rods_at_rest
+        self._spoil(self._failing.table[:0], key, 0, wheels, torque, dipole, self._felt)
         self._report = typed_call(tachometer.report)
         self._steps = round(values[DURATION] / values[PERIOD])
         self.finished = False
