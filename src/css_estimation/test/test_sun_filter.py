@@ -22,7 +22,7 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_VALID,
 )
 from css_estimation.sun_filter import sun_filter
-from css_estimation.sun_filter.cell_update import rising
+from css_estimation.sun_filter.cell_model import rising
 from css_estimation.sun_filter.response import respond
 
 SIX = LAYOUTS["six faces"]
@@ -214,7 +214,7 @@ def test_a_covariance_that_is_none_ends_the_estimate_and_not_the_filter(broken):
     flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.005, earth=(0.3, 0.9, 0.2))
     flight.fly(60.0)
     states = flight.memory.covariances.shape[1]
-    flight.memory.covariances[:] = broken * np.eye(states)
+    flight.memory.covariances[:] = np.where(np.eye(states) > 0.0, broken, 0.0)
     for _ in range(20):
         heading = flight.step()
         assert np.isfinite([*heading.sun_b, *heading.covariance, *heading.omega_bn_b]).all()
