@@ -20,7 +20,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 
-_ENCAPSULATION = b"\x00\x01\x00\x00"  # XCDR1, little endian
+ENCAPSULATION = b"\x00\x01\x00\x00"  # XCDR1, little endian
 _SHIFT = bytes(4)
 _HEADER = struct.Struct("<iII")
 _U32 = struct.Struct("<I")
@@ -110,7 +110,7 @@ class Codec:
         Raises:
             DecodeError: the bytes are too short, too long or not little-endian CDR.
         """
-        if data[:4] != _ENCAPSULATION:
+        if data[:4] != ENCAPSULATION:
             raise DecodeError(f"{self.type_name}: encapsulation {data[:4].hex()} is not little-endian CDR")
         # Shifted by four bytes, the doubles behind the encapsulation are aligned in memory: kernels take the
         # arrays as they are, in the one form for which they were compiled.
@@ -158,7 +158,7 @@ class Codec:
         """
         frame = sample.frame_id.encode() + b"\0"
         seconds, nanoseconds = divmod(sample.stamp_ns, 1_000_000_000)
-        parts = [_ENCAPSULATION, _HEADER.pack(seconds, nanoseconds, len(frame)), frame]
+        parts = [ENCAPSULATION, _HEADER.pack(seconds, nanoseconds, len(frame)), frame]
         at = 12 + len(frame)
         values = sample.__dict__
         for field in self.fields:
@@ -263,7 +263,7 @@ def stamp_of(data: bytes) -> int:
     Raises:
         DecodeError: the bytes are too short or not little-endian CDR.
     """
-    if len(data) < 12 or data[:4] != _ENCAPSULATION:
+    if len(data) < 12 or data[:4] != ENCAPSULATION:
         raise DecodeError(f"{len(data)} bytes do not begin with a Header in little-endian CDR")
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return seconds * 1_000_000_000 + nanoseconds
