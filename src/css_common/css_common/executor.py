@@ -2,8 +2,8 @@
 """The executor of every Sunpoint process.
 
 rclpy's EventsExecutor is several times faster than SingleThreadedExecutor but experimental, and its `spin()` runs no
-callback in Jazzy while `spin_once()` works: it is used through `spin_until` and `spin_about_until` alone. `DrainingExecutor` is the fallback
-(environment variable SUNPOINT_EXECUTOR=draining): a SingleThreadedExecutor that empties each ready queue before it
+callback in Jazzy while `spin_once()` works: it is used through `spin_until` and `spin_about_until` alone.
+`DrainingExecutor` is the fallback (environment variable SUNPOINT_EXECUTOR=draining): a SingleThreadedExecutor that empties each ready queue before it
 builds its wait set anew, which is what costs rclpy most of its time.
 """
 
