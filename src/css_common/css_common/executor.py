@@ -3,8 +3,8 @@
 
 rclpy's EventsExecutor is several times faster than SingleThreadedExecutor but experimental, and its `spin()` runs no
 callback in Jazzy while `spin_once()` works: it is used through `spin_until` and `spin_about_until` alone.
-`DrainingExecutor` is the fallback (environment variable SUNPOINT_EXECUTOR=draining): a SingleThreadedExecutor that empties each ready queue before it
-builds its wait set anew, which is what costs rclpy most of its time.
+`DrainingExecutor` is the fallback (environment variable SUNPOINT_EXECUTOR=draining): a SingleThreadedExecutor that
+empties each ready queue before it builds its wait set anew, which is what costs rclpy most of its time.
 """
 
 import os
