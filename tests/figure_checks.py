@@ -14,7 +14,8 @@ _LEGIBLE = 4.5  # contrast of small letters, Web Content Accessibility Guideline
 @pytest.fixture(autouse=True)
 def checked_figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Looks at every figure that a test writes. Import it where figures are drawn."""
-    savefig, faults = Figure.savefig, []
+    savefig = Figure.savefig
+    faults: list[str] = []
 
     def checked(figure: Figure, path, **options) -> None:
         faults.extend(f"{path}: {fault}" for fault in figure_faults(figure))

@@ -30,10 +30,14 @@ def executable(kind: type[Component]) -> str:
 
 
 @cache
+def _missions() -> list[Mission]:
+    return [load_mission(name) for name in MISSIONS]
+
+
 def mission_of(kind: type[Component]) -> Mission | None:
     """The first mission in whose graph a component flies."""
-    flown = (load_mission(name) for name in MISSIONS)
-    return next((mission for mission in flown if any(node.component is kind for node in mission.nodes)), None)
+    flown = (mission for mission in _missions() if any(node.component is kind for node in mission.nodes))
+    return next(flown, None)
 
 
 def settings_of(kind: type[Component], *sections: str) -> dict[str, Any]:

@@ -10,7 +10,7 @@ MISSION_FILE = Path(__file__).parents[1] / "config" / "okeefe_2013.yaml"
 STATED = {
     name.replace(".", "__"): value
     for name, value in sections_of_file(MISSION_FILE)["/**"].items()
-    if name.split(".")[0] in ("orbit", "spacecraft", "cells", "wheels")
+    if name.split(".")[0] in ("orbit", "spacecraft", "cells", "wheels") or name in ("mission.epoch", "mission.duration")
 }
 """What its mission says of them, by the names that `default_values` takes."""
 

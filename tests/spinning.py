@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A spinning payload over Andoya that several tests share."""
 
+from typing import Any
+
 import numpy as np
 
 from css_common.epochs import parse_utc
@@ -18,19 +20,31 @@ from css_sim.spinning_payload import PayloadMotion, payload_motion, payload_stat
 
 EPOCH = "2006-07-01T06:39:00Z"
 EPOCH_NS = parse_utc(EPOCH)
-FLIGHT = {
+FLIGHT: dict[str, Any] = {
     "payload__phase_starts": [0.0, 62.19, 66.17, 69.18],
     "payload__spin_hz": [6.0, 6.0, 6.0, 5.45],
     "payload__coning_period": [0.65, 0.2529, 0.2529, 0.2618],
     "payload__coning_angle_deg": [0.8, 12.4, 12.89, 12.89],
     "payload__flat_spin_start": 357.0,
 }
-STEADY = {"payload__spin_hz": [5.45], "payload__flat_spin_start": 1e5}
+ANDOYA: dict[str, Any] = {
+    "orbit__launch__latitude_deg": 69.29,
+    "orbit__launch__longitude_deg": 16.02,
+    "orbit__launch__azimuth_deg": 330.0,
+    "orbit__launch__elevation_deg": 80.0,
+    "orbit__launch__apogee": 169e3,
+    "payload__axis_azimuth_deg": 330.0,
+    "payload__axis_elevation_deg": 80.0,
+    "payload__spin_hz": [5.45],
+    "payload__coning_period": [0.2618],
+    "payload__coning_angle_deg": [12.89],
+}
+STEADY: dict[str, Any] = {"payload__spin_hz": [5.45], "payload__flat_spin_start": 1e5}
 
 
 def payload_values(**changes) -> Values:
     """Sections of a mission with a spinning payload on a ballistic arc."""
-    given = {"orbit__source": "ballistic", "mission__epoch": EPOCH, **changes}
+    given = {"orbit__source": "ballistic", "mission__epoch": EPOCH, **ANDOYA, **changes}
     return default_values((*MISSION, *ORBIT, *PAYLOAD, *SLITS), **given)
 
 

@@ -3,8 +3,10 @@
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from css_analysis.flight_log import FlightLog
 from css_common.codec import codec_of
@@ -23,7 +25,7 @@ def stamps(steps: int, period: float = DT) -> np.ndarray:
     return EPOCH_NS + np.arange(steps) * round(period * 1e9)
 
 
-def columns(message_type: type, stamp_ns: np.ndarray, **given: np.ndarray) -> Columns:
+def columns(message_type: type, stamp_ns: np.ndarray, **given: Any) -> Columns:
     """Columns with zeros in the fields that are not given; a single row is repeated."""
     fields = {}
     for field in codec_of(message_type).fields:
@@ -35,19 +37,19 @@ def columns(message_type: type, stamp_ns: np.ndarray, **given: np.ndarray) -> Co
     return Columns(stamp_ns, **fields)
 
 
-def tilted(angle_deg: np.ndarray, azimuth: float = 0.0) -> np.ndarray:
+def tilted(angle_deg: ArrayLike, azimuth: float = 0.0) -> np.ndarray:
     """(M, 3) unit vectors at given angles from +z."""
     a = np.radians(np.asarray(angle_deg, dtype=np.float64))
     return np.column_stack([np.sin(a) * np.cos(azimuth), np.sin(a) * np.sin(azimuth), np.cos(a)])
 
 
-def truth(pointing_deg: np.ndarray, illumination: np.ndarray | float = 1.0, **given: np.ndarray) -> Columns:
+def truth(pointing_deg: np.ndarray, illumination: np.ndarray | float = 1.0, **given: Any) -> Columns:
     """Truth with the Sun at given angles from the array normal +z: frames b and n agree."""
     given = {"sun_n": tilted(pointing_deg), "illumination": illumination, "solar_flux": 1.0} | given
     return columns(SpacecraftState, stamps(len(pointing_deg)), **given)
 
 
-def estimates(sun_b: np.ndarray, **given: np.ndarray | float) -> Columns:
+def estimates(sun_b: np.ndarray, **given: Any) -> Columns:
     """Valid estimates at every step."""
     return columns(SunEstimate, stamps(len(sun_b)), **({"sun_b": sun_b, "validity": 2} | given))
 

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from presence import present
 from spinning import STEADY, motion_of, record_of, sun_angles, sun_over_andoya
 
 from css_estimation.spin.coning import (
@@ -71,33 +72,33 @@ def test_a_given_inertia_ratio_chooses_the_true_frequency(frequency):
     passages = record_of(motion, SUN_N, 0.0, 60.0).passages
     ratio = inertia_ratio(5.45, 1.0 / frequency, math.radians(6.445))
     coning = analyse_coning(passages, INCLINATION, ratio)
-    assert coning.choice == CHOICE_INERTIA
-    assert len(coning.candidates) <= 4
-    assert coning.frequency == pytest.approx(frequency, abs=5e-3)
-    assert coning.candidates[coning.chosen].inertia_ratio == pytest.approx(ratio, abs=2e-3)
-    assert math.degrees(coning.full_angle) == pytest.approx(12.89, abs=0.02)
+    assert present(coning).choice == CHOICE_INERTIA
+    assert len(present(coning).candidates) <= 4
+    assert present(coning).frequency == pytest.approx(frequency, abs=5e-3)
+    assert present(coning).candidates[present(coning).chosen].inertia_ratio == pytest.approx(ratio, abs=2e-3)
+    assert math.degrees(present(coning).full_angle) == pytest.approx(12.89, abs=0.02)
 
 
 def test_a_ratio_between_two_candidates_leaves_the_choice_to_the_pulses(up_leg):
     passages = up_leg.passages.between(0.0, 40.0)
     coning = analyse_coning(passages, INCLINATION, 1.0)  # aliases are at 0.700 and 1.301
-    assert (coning.choice, coning.chosen, coning.rivals) == (CHOICE_EVENTS, 1, ())
+    assert (present(coning).choice, present(coning).chosen, present(coning).rivals) == (CHOICE_EVENTS, 1, ())
 
 
 def test_what_nothing_tells_apart_is_ambiguous_and_its_rivals_are_named(up_leg, monkeypatch):
     monkeypatch.setattr("css_estimation.spin.coning.fit_motion", lambda *arguments: None)
     passages = up_leg.passages.between(0.0, 40.0)
     near = analyse_coning(passages, INCLINATION, 0.72)
-    assert (near.choice, near.chosen, near.rivals) == (CHOICE_INERTIA, 1, ())
+    assert (present(near).choice, present(near).chosen, present(near).rivals) == (CHOICE_INERTIA, 1, ())
     between = analyse_coning(passages, INCLINATION, 1.0)
-    assert (between.choice, between.chosen, between.rivals) == (CHOICE_INERTIA, 1, (2,))
-    assert "ambiguous, 0.1412 s may as well be: the given ratio of moments" in justification(between)
+    assert (present(between).choice, present(between).chosen, present(between).rivals) == (CHOICE_INERTIA, 1, (2,))
+    assert "ambiguous, 0.1412 s may as well be: the given ratio of moments" in justification(present(between))
     unknown = analyse_coning(passages, INCLINATION)
-    assert unknown.choice == CHOICE_POWER
-    assert sorted((unknown.chosen, *unknown.rivals)) == [0, 1, 2, 3]
-    powers = [candidate.power for candidate in unknown.candidates]
-    assert powers[unknown.chosen] == max(powers)
-    assert "the largest power is no proof; give the ratio" in justification(unknown)
+    assert present(unknown).choice == CHOICE_POWER
+    assert sorted((present(unknown).chosen, *present(unknown).rivals)) == [0, 1, 2, 3]
+    powers = [candidate.power for candidate in present(unknown).candidates]
+    assert powers[present(unknown).chosen] == max(powers)
+    assert "the largest power is no proof; give the ratio" in justification(present(unknown))
 
 
 def test_the_papers_method_reads_too_little_for_two_reasons_with_numbers(up_leg, up_leg_coning):
@@ -129,10 +130,10 @@ def test_the_error_of_the_sun_angle_is_the_predicted_one(up_leg):
 def test_more_heads_leave_fewer_aliases_and_read_more_of_the_cone(heads, candidates):
     passages = record_of(motion_of(**STEADY), SUN_N, 0.0, 40.0, slits__head_azimuths_deg=heads).passages
     coning = analyse_coning(passages, INCLINATION)
-    assert len(coning.candidates) == candidates
-    assert coning.frequency == pytest.approx(1.0 / PERIOD, abs=5e-3)
-    assert (coning.choice == CHOICE_ONLY) == (candidates == 1)
-    assert math.degrees(coning.full_angle) == pytest.approx(12.89, abs=0.02)
+    assert len(present(coning).candidates) == candidates
+    assert present(coning).frequency == pytest.approx(1.0 / PERIOD, abs=5e-3)
+    assert (present(coning).choice == CHOICE_ONLY) == (candidates == 1)
+    assert math.degrees(present(coning).full_angle) == pytest.approx(12.89, abs=0.02)
 
 
 def test_missing_passages_do_not_shift_the_phase_of_the_rest(up_leg):
@@ -173,7 +174,7 @@ def test_motions_are_fitted_over_fifteen_seconds_each(up_leg, monkeypatch):
     start, end = passages.time[0], passages.time[-1]
     turn = 1.0 / 5.45
     middle = 0.5 * (start + end)
-    count = len(coning.candidates)
+    count = len(present(coning).candidates)
     np.testing.assert_allclose(spans[:count], [(middle - 7.5, middle + 7.5)] * count, atol=1.5 * turn)
     quarters = np.linspace(start, end, 5)
     np.testing.assert_allclose(spans[count:], np.stack((quarters[:-1], quarters[1:]), 1), atol=1.5 * turn)

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from flights import fly_composed, messages_by_topic, samples
+from presence import present
 
 from css_analysis.estimate_errors import attitude_errors
 from css_analysis.flight_log import read_flight
@@ -11,6 +12,7 @@ from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
 from css_bringup.replay_bag import replay
 from css_bringup.replay_pass import parse_request
+from css_common.component import Plant
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_monte_carlo.direct_flight import fly_and_keep
@@ -20,7 +22,15 @@ SENSORS_ALONE = """
 /**:
   ros__parameters:
     mission: {epoch: "2006-07-01T06:39:00Z", duration: 0.5, period: 0.01}
-    orbit: {source: ballistic}
+    orbit:
+      source: ballistic
+      launch: {latitude_deg: 69.29, longitude_deg: 16.02, azimuth_deg: 330.0, elevation_deg: 80.0, apogee: 169.0e+3}
+    payload:
+      axis_azimuth_deg: 330.0
+      axis_elevation_deg: 80.0
+      spin_hz: [5.45]
+      coning_period: [0.2618]
+      coning_angle_deg: [12.89]
     graph: {nodes: [css_sim/rocket, css_sim/slit_sensor, css_sim/magnetometer]}
 """
 
@@ -69,7 +79,7 @@ def test_the_estimators_replay_to_the_bytes_that_flew(flown, tmp_path):
     mission, bag, _ = flown
     requests = [parse_request(name) for name in ("slit_sun_angle", "triad", "coning")]
     result = replay(bag, tmp_path / "replayed", mission, requests, {})
-    assert [run.comparison.identical for run in result.replayed] == [True, True, True]
+    assert [present(run.comparison).identical for run in result.replayed] == [True, True, True]
 
 
 def test_calls_one_after_the_other_give_what_topics_give(flown):
@@ -86,13 +96,13 @@ def test_calls_one_after_the_other_give_what_topics_give(flown):
 def test_a_recording_tells_spin_and_coning(flown):
     _, bag, _ = flown
     flight = read_spinning(bag)
-    assert 35 < len(flight.passages.time) < 48
-    assert flight.refused > 0
-    assert flight.reasons.total() == flight.refused
-    told = spin_object(flight)
+    assert 35 < len(present(flight).passages.time) < 48
+    assert present(flight).refused > 0
+    assert present(flight).reasons.total() == present(flight).refused
+    told = spin_object(present(flight))
     assert told["legs"][0]["spin_hz"] == pytest.approx(6.0, rel=0.005)
-    assert told["attitudes"] == len(flight.attitudes) > 30
-    assert len(spin_lines(flight)) == 2
+    assert told["attitudes"] == len(present(flight).attitudes) > 30
+    assert len(spin_lines(present(flight))) == 2
 
 
 def test_attitudes_of_a_recording_are_measured_at_their_own_instants(flown):
@@ -120,7 +130,9 @@ def test_a_truth_of_another_motion_gives_no_pulses():
     mission = mission_from_text(SENSORS_ALONE, "sensors alone")
     rocket = mission.node("rocket")
     other = mission.with_overrides(["payload.axis_elevation_deg=60"]).node("slit_sensor")
-    truth = rocket.component(rocket.name, rocket.values).begin()["truth"]
+    plant = rocket.component(rocket.name, rocket.values)
+    assert isinstance(plant, Plant)
+    truth = plant.begin()["truth"]
     sensor = other.component(other.name, other.values)
     with pytest.raises(ValueError, match="not the motion of the payload section"):
         sensor.cycle(mission.epoch_ns, {"truth": truth})

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from presence import present
 
 SOURCES = Path(__file__).parents[1] / "src"
 
@@ -159,7 +160,9 @@ def private_names(tree: ast.Module) -> Iterator[str]:
     public_all_the_same = {"_replace", "_fields", "_asdict", "_field_defaults", "_exit"}
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] in ROS:
-            yield from (n for n in (*node.module.split("."), *(a.name for a in node.names)) if n.startswith("_"))
+            yield from (
+                n for n in (*present(node.module).split("."), *(a.name for a in node.names)) if n.startswith("_")
+            )
         if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
             yield from () if node.attr in own | public_all_the_same else (ast.unparse(node),)
 
@@ -172,5 +175,5 @@ def test_what_is_not_public_in_rclpy_is_taken_in_one_place():
 
 def test_all_packages_have_one_version_which_the_changelog_knows():
     manifests = {path: path.read_text(encoding="utf-8") for path in SOURCES.glob("*/package.xml")}
-    (version,) = {re.search(r"<version>(.*?)</version>", text)[1] for text in manifests.values()}
+    (version,) = {present(re.search(r"<version>(.*?)</version>", text))[1] for text in manifests.values()}
     assert f"\n## {version}\n" in (SOURCES.parent / "CHANGELOG.md").read_text(encoding="utf-8")

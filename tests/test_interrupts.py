@@ -5,6 +5,7 @@ import os
 import signal
 
 from flights import messages_by_topic, short_mission
+from presence import present
 
 from css_bringup.composed import ComposedFlight
 from css_bringup.processes import fly_processes
@@ -71,7 +72,7 @@ def test_a_flight_that_cannot_be_recorded_any_more_ends(tmp_path):
     with ComposedFlight(mission, tmp_path / "bag") as flight:
 
         def fill_disk(seconds: float) -> None:
-            flight.recorder.failure = "No space left on device"
+            present(flight.recorder).failure = "No space left on device"
 
         result = flight.fly(fill_disk)
     assert result.failure == "the flight is not recorded any more: No space left on device"

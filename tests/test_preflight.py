@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from flights import short_mission
 from listing import MISSIONS
+from presence import present
 
 from css_bringup.commands import fly
 from css_common.command import USAGE
@@ -154,7 +155,7 @@ def test_gains_fly_below_the_limit_and_swing_between_torque_limits_above(cutoff,
 
     def wheels(share):
         flown = mission.with_overrides([f"mrp_control.gains.p={share * limit}"])
-        torque = fly_directly(flown).wheels.torque[-100:]
+        torque = present(fly_directly(flown).wheels).torque[-100:]
         return np.max(np.abs(torque)), np.mean(np.sign(torque[1:, 0]) != np.sign(torque[:-1, 0]))
 
     calm, _ = wheels(0.9)

@@ -102,7 +102,7 @@ def test_coverage(width):
 
 
 def configuration(estimator, gyro, scale, first):
-    keys = (
+    keys: tuple[str, ...] = (
         "heading_error_mean_deg",
         "heading_error_p95_deg",
         "heading_error_eclipse_deg",

@@ -4,9 +4,11 @@
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from listing import MISSIONS
+from presence import present
 from rclpy.lifecycle import TransitionCallbackReturn
 
 from css_common.mission import load_mission
+from css_common.plant_host import PlantNode
 from css_common.testing import Bench
 
 
@@ -16,7 +18,8 @@ def test_every_partner_of_the_plant(name):
     mission = mission.with_overrides([f"mission.duration={100 * mission.values.mission.period!r}"])
     with Bench() as bench:
         nodes = bench.host_all(mission)
-        plant = nodes.pop(mission.plant.name)
+        plant = nodes.pop(present(mission.plant).name)
+        assert isinstance(plant, PlantNode)
         for node in nodes.values():
             at = plant.stamp_ns
             bench.until(lambda: plant.done or plant.stamp_ns > at, "the flight goes on")  # noqa: B023

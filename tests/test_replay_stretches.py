@@ -16,7 +16,7 @@ from css_bringup.replay_bag import mission_of_bag
 from css_bringup.replay_pass import Replay, parse_request
 from css_bringup.replay_stretch import Stretch
 from css_common.codec import Sample, codec_of
-from css_common.component import Component
+from css_common.component import Cycles
 from css_estimation.nodes.ekf import Ekf
 from css_msgs.msg import CssVoltages, SunEstimate
 from css_recording.bag_metadata import Topic
@@ -28,7 +28,7 @@ STEPS = 1500
 ONE_BY_ONE = sys.maxsize
 with BagReader(REFERENCE) as _reader:
     START = _reader.start_ns
-    MISSION = _reader.mission_text
+    MISSION = _reader.mission_text or ""
 INPUTS = {"/css/voltages": CssVoltages, "/gyro/imu": Imu}
 
 
@@ -198,20 +198,20 @@ def test_an_event_happens_at_its_step(taken_at_once, tmp_path):
 
 def test_a_cycle_that_fails_in_between_fails_alone(taken_at_once, tmp_path, monkeypatch):
     def failing(of: Callable) -> Callable:
-        def cycle(component: Component, stamp_ns: int, received: object) -> object:
+        def cycle(component: Ekf, stamp_ns: int, received: object) -> object:
             if step_of(stamp_ns) == 700:
                 raise ZeroDivisionError
             return of(component, stamp_ns, received)
 
         return cycle
 
-    def cycles(component: Component, steps: object) -> object:
+    def cycle_through(component: Ekf, steps: Cycles) -> object:
         if START + 70 * SECOND in steps.stamps_ns:
             raise ZeroDivisionError
         return at_once(component, steps)
 
-    at_once = Ekf.cycles
+    at_once = Ekf.cycle_through
     monkeypatch.setattr(Ekf, "cycle", failing(Ekf.cycle))
-    monkeypatch.setattr(Ekf, "cycles", cycles)
+    monkeypatch.setattr(Ekf, "cycle_through", cycle_through)
     result = both_ways(REFERENCE, tmp_path, "ekf:gyro=off", "ekf")
     assert [run["counts"][:2] for run in result["runs"]] == [(STEPS - 1, 1)] * 2

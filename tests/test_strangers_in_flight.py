@@ -2,7 +2,7 @@
 """Other nodes on the topics of a flight: it is the flight without them, and says at its end that they were there."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 
 import numpy as np
@@ -106,7 +106,7 @@ KINDS = {
 
 
 @contextmanager
-def _disturbed(flight: ComposedFlight, disturb) -> Stranger:
+def _disturbed(flight: ComposedFlight, disturb) -> Iterator[Stranger]:
     stranger = Stranger(flight)
     disturb(stranger, flight)
     try:

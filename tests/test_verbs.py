@@ -16,6 +16,8 @@ NODES = sorted(
     (file.parts[-3], file.stem) for file in ROOT.glob("src/*/*/nodes/[a-z]*.py") if not file.stem.startswith("_")
 )
 
+SLOW = {"numba", "scipy", "rclpy", "matplotlib", "pyarrow", "rosbags", "mcap"}
+
 
 def _executable(package: str, executable: str) -> Path:
     path = Path(get_package_prefix(package)) / "lib" / package / executable
@@ -24,7 +26,7 @@ def _executable(package: str, executable: str) -> Path:
 
 
 def _help(package: str, executable: str, verb: str = "") -> str:
-    command = [_executable(package, executable), "--help"]
+    command = [str(_executable(package, executable)), "--help"]
     typed = {"SUNPOINT_VERB": f"{verb}:{executable}"} if verb else {}
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=100, check=False, env={**os.environ, **typed}
@@ -44,6 +46,18 @@ def test_verb_explains_itself_under_the_name_that_was_typed(verb):
     codes = [line.split()[0] for line in lines[lines.index("exit codes:") + 1 :]]
     assert codes == sorted(codes, key=int) and {"0", "2", "130"} <= set(codes) <= {"0", "1", "2", "130"}
     assert max(map(len, lines)) <= 120
+
+
+@pytest.mark.parametrize("verb", sorted(name for name, verb in VERBS.items() if verb.package))
+def test_verb_loads_nothing_that_takes_long_before_its_options_are_read(verb):
+    entry = VERBS[verb]
+    done = subprocess.run(
+        [_executable(entry.package, entry.executable), "--help"],
+        capture_output=True, text=True, timeout=100, check=True, env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"},
+    )  # fmt: skip
+    loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines()}
+    assert "argparse" in loaded
+    assert loaded.isdisjoint(SLOW)
 
 
 @pytest.mark.parametrize(("verb", "executable"), [("record", "recorder"), ("import-csv", "import_csv")])
@@ -70,6 +84,7 @@ def test_help_that_nobody_reads_is_no_error(package, executable):
     process = subprocess.Popen(
         [_executable(package, executable), "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
+    assert process.stdout is not None
     process.stdout.close()
     _, err = process.communicate(timeout=100)
     assert (process.returncode, err) == (0, b"")

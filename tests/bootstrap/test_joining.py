@@ -2,6 +2,7 @@
 """Which flight `shell`, `record` and `play` join, and what they say about it."""
 
 import os
+from typing import Any
 
 import pytest
 
@@ -122,7 +123,7 @@ def test_what_is_no_domain_is_refused(running, environ):
 
 def test_a_shell_joins_a_flight_by_name(monkeypatch, capfd):
     """From the command line to the environment of the command, with a domain that is really held."""
-    entered = {}
+    entered: dict[Any, Any] = {}
     monkeypatch.setattr(cli, "_replace_process", lambda command, env: entered.update(env, command=command) or 0)
     monkeypatch.setattr(cli, "find_need", lambda *_: False)
     monkeypatch.delenv("ROS_DOMAIN_ID")

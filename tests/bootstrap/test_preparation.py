@@ -9,6 +9,7 @@ import sys
 import textwrap
 
 import pytest
+from presence import present
 
 from bootstrap import build as building
 from bootstrap import workspace
@@ -92,7 +93,7 @@ START = """
 
 
 def start(project, command):
-    paths = [os.path.dirname(os.path.dirname(module.__file__)) for module in (workspace, places)]
+    paths = [os.path.dirname(os.path.dirname(present(module.__file__))) for module in (workspace, places)]
     code = textwrap.dedent(START).format(paths=paths, root=str(project.root), command=command)
     return subprocess.Popen([sys.executable, "-I", "-S", "-c", code], stderr=subprocess.PIPE, text=True)
 
@@ -136,10 +137,12 @@ def test_interruption_stops_everything_that_was_started(project, number):
 
 
 def fake_colcon(project, results):
-    """Stands for colcon: leaves exit codes as it does, and fails like it."""
+    """Stands for colcon: leaves exit codes as it does, and fails like it. And what it is called with."""
+
+    commands = []
 
     def run_colcon(_work, _step, command, _log):
-        run_colcon.commands.append([str(part) for part in command])
+        commands.append([str(part) for part in command])
         for name, code in results.items():
             folder = project.build / name
             folder.mkdir(parents=True, exist_ok=True)
@@ -147,8 +150,7 @@ def fake_colcon(project, results):
         if any(results.values()):
             raise Refusal("colcon failed")
 
-    run_colcon.commands = []
-    return run_colcon
+    return run_colcon, commands
 
 
 def need(**packages):
@@ -157,7 +159,7 @@ def need(**packages):
 
 def test_packages_that_were_built_are_remembered_when_another_fails(work, monkeypatch):
     project = work.project
-    monkeypatch.setattr(Work, "run", fake_colcon(project, {"good": 0, "bad": 1, "edited": 1}))
+    monkeypatch.setattr(Work, "run", fake_colcon(project, {"good": 0, "bad": 1, "edited": 1})[0])
     work.state.packages = {"edited": "0", "other": "4"}
     with pytest.raises(Refusal):
         building.build(work, need(good="1", bad="2", edited="3"))
@@ -182,7 +184,7 @@ def test_interrupted_package_begins_from_nothing(work, monkeypatch):
 
 def test_executables_of_removed_nodes_do_not_stay(work, monkeypatch):
     project = work.project
-    monkeypatch.setattr(Work, "run", fake_colcon(project, {"sim": 0}))
+    monkeypatch.setattr(Work, "run", fake_colcon(project, {"sim": 0})[0])
     stale = project.executable("sim", "old_node")
     stale.parent.mkdir(parents=True)
     stale.touch()
@@ -208,11 +210,11 @@ def test_executables_of_removed_nodes_do_not_stay(work, monkeypatch):
 def test_what_colcon_builds(work, monkeypatch, built, changed, folder, option):
     project = work.project
     (project.source / changed / folder).mkdir(parents=True)
-    colcon = fake_colcon(project, {changed: 0})
+    colcon, commands = fake_colcon(project, {changed: 0})
     monkeypatch.setattr(Work, "run", colcon)
     work.state.packages = dict(built)
     building.build(work, need(**{changed: "1"}))
-    [command] = colcon.commands
+    [command] = commands
     assert [part for part in command if part.startswith("--packages")] == ([option] if option else [])
     assert "--symlink-install" in command
     assert "-DCMAKE_BUILD_TYPE=Release" in command

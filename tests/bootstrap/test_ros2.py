@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from presence import present
 
 pytest.importorskip("ament_index_python")
 ROS2 = Path(__file__).resolve().parents[2] / "tools" / "ros2.py"
@@ -104,7 +105,7 @@ def test_interrupt_reaches_the_executable(prefix):
     process = subprocess.Popen(
         command("run", "alpha", "wait"), env=environment(prefix), stdout=subprocess.PIPE, text=True
     )
-    assert process.stdout.readline() == "ready\n"
+    assert present(process.stdout).readline() == "ready\n"
     time.sleep(0.05)
     process.send_signal(signal.SIGINT)
     assert process.communicate(timeout=100)[0] == "caught\n"

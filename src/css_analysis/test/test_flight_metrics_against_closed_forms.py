@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from presence import present
 from rich.console import Console
 from synthetic_flight import DT, columns, estimates, flight, stamps, tilted, truth
 
@@ -33,8 +34,8 @@ def slewing_flight(error_deg: float = 3.0) -> FlightLog:
 
 def test_all_quantities_of_a_known_flight():
     log = slewing_flight()
-    log.truth.omega_bn_b[:, 1] = np.radians(1.0)
-    log.truth.omega_bn_b[-steps(60.0) :, 1] = np.radians(0.25)
+    present(log.truth).omega_bn_b[:, 1] = np.radians(1.0)
+    present(log.truth).omega_bn_b[-steps(60.0) :, 1] = np.radians(0.25)
     (run,) = estimator_runs(log)
     counted = 200.0 + 20.0 + 130.0
     after = 200.0 * 10.0 + 20.0 * 40.0 + 130.0 * 5.0
@@ -72,7 +73,7 @@ def test_the_final_rate_is_that_of_the_last_minute():
     """A rate that grows with time: its mean over a window tells where the window begins."""
     log = flight(np.full(steps(200.0), 10.0), ekf=estimates(tilted(np.full(steps(200.0), 10.0))))
     time = np.arange(steps(200.0)) * DT
-    log.truth.omega_bn_b[:, 0] = np.radians(0.01 * time)
+    present(log.truth).omega_bn_b[:, 0] = np.radians(0.01 * time)
     (run,) = estimator_runs(log)
     assert run["rate_final_deg_s"] == pytest.approx(0.01 * (time[-1] - 0.5 * (60.0 - DT)))
 
@@ -227,7 +228,7 @@ def test_headings_in_eclipse_and_at_dawn_are_told_apart():
 
 def test_runs_are_valid_json_and_a_plain_table():
     log = slewing_flight()
-    log.estimates["none"] = estimates(np.zeros((len(log.truth), 3)), validity=0)
+    log.estimates["none"] = estimates(np.zeros((len(present(log.truth)), 3)), validity=0)
     runs = estimator_runs(log)
     assert json.loads(json.dumps(runs, allow_nan=False)) == runs
     out = io.StringIO()

@@ -3,10 +3,12 @@
 
 from itertools import combinations
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib.text import Annotation
+from noting import noted
 
 from css_analysis import spin_figures
 from css_estimation.spin.coning import Passages
@@ -17,8 +19,9 @@ EVENTS = [(62.19, "motor separation"), (66.17, "nosecone"), (69.18, "booms"), (3
 @pytest.fixture
 def figures(monkeypatch):
     """What was saved."""
-    saved, save = [], spin_figures.save
-    monkeypatch.setattr(spin_figures, "save", lambda figure, path: saved.append(figure) or save(figure, path))
+    saved: list[Any] = []
+    save = spin_figures.save
+    monkeypatch.setattr(spin_figures, "save", lambda figure, path: noted(saved, figure, lambda: save(figure, path)))
     return saved
 
 
@@ -48,7 +51,7 @@ def test_names_of_events_neither_overlap_nor_cover_the_data(axes):
 
 def test_the_line_of_a_microsecond_is_where_it_says(tmp_path, figures):
     candidates = [SimpleNamespace(frequency=1.6), SimpleNamespace(frequency=3.8)]
-    studies = {"one head": SimpleNamespace(candidates=candidates, residuals=(2e-4, 3e-7))}
+    studies: Any = {"one head": SimpleNamespace(candidates=candidates, residuals=(2e-4, 3e-7))}
     spin_figures.write_alias_figure(studies, 5.45, tmp_path / "aliases.png")
     (axes,) = figures[0].axes
     points, line = axes.lines

@@ -5,8 +5,10 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
+from presence import present
 
 from css_analysis.flight_log import read_flight
 from css_analysis.quantities import QUANTITIES
@@ -116,16 +118,16 @@ def test_a_recording_is_replaced_only_when_asked_for(tmp_path, capfd):
     assert fly.main([*arguments, "1"]) != USAGE
     assert fly.main([*arguments, "2"]) == USAGE
     assert "--overwrite" in capfd.readouterr().err
-    assert read_flight(tmp_path / "bag").truth.stamp_ns.size == 10
+    assert present(read_flight(tmp_path / "bag").truth).stamp_ns.size == 10
     assert fly.main([*arguments, "2", "--overwrite"]) != USAGE
-    assert read_flight(tmp_path / "bag").truth.stamp_ns.size == 20
+    assert present(read_flight(tmp_path / "bag").truth).stamp_ns.size == 20
 
 
 def test_the_recorder_of_processes_replaces_only_when_asked_for(tmp_path):
     mission = load_mission("okeefe_2013")
     for overwrite in (False, True):
         supervisor = Supervisor(mission, tmp_path / "bag", tmp_path / "logs", overwrite=overwrite)
-        assert ("--overwrite" in supervisor.recorder.command) == overwrite
+        assert ("--overwrite" in present(supervisor.recorder).command) == overwrite
         supervisor.clean()
 
 
@@ -135,7 +137,7 @@ def test_a_log_begins_with_its_flight_and_goes_on_after_a_restart(tmp_path):
     child = Child("node", [sys.executable, "-c", "print('started')"], log)
     for starts in (1, 2):
         child.start()
-        child.process.wait()
+        present(child.process).wait()
         child.stop(0.0)
         assert log.read_text() == "started\n" * starts
 
@@ -214,7 +216,8 @@ def test_what_came_of_a_flight_is_said_once_and_is_its_exit_code(came, code, sai
 
 
 def test_cycles_that_fail_in_a_replay_are_counted_and_the_first_is_reported():
-    mission, told = load_mission("okeefe_2013"), []
+    mission = load_mission("okeefe_2013")
+    told: list[Any] = []
     run = replayed(parse_request("wavg"), mission, mission, [], frozenset())
     run.begin(told.append)
     assert [run.step(mission.epoch_ns + k, {}) for k in range(3)] == 3 * [[]]

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from presence import present
 
 from css_bringup import processes, warden
 from css_bringup.child import Child, Pulse
@@ -112,7 +113,7 @@ input()
 def test_the_death_of_the_supervisor_is_an_interrupt(tmp_path):
     log = tmp_path / "node.log"
     parent = subprocess.Popen([sys.executable, "-c", PARENT, log], stdout=subprocess.PIPE, stdin=subprocess.PIPE)
-    pid = int(parent.stdout.readline())
+    pid = int(present(parent.stdout).readline())
     _until(lambda: log.exists() and "beaten" in log.read_text())
     handle = os.pidfd_open(pid)
     parent.kill()
@@ -138,7 +139,7 @@ def test_duties_are_not_handed_on(tmp_path):
     program = "from css_common import supervised; supervised.take_on(); import os; print(*os.environ)"
     child = Child("node", [sys.executable, "-c", program], tmp_path / "node.log")
     child.start()
-    assert child.process.wait() == 0
+    assert present(child.process).wait() == 0
     child.stop(0.0)
     assert "SUNPOINT_SUPERVISOR" not in child.log.read_text()
     assert "SUNPOINT_PULSE" not in child.log.read_text()
@@ -150,7 +151,7 @@ def test_the_warden_wakes_what_is_stopped_kills_what_hangs_and_tidies_up(tmp_pat
         [sys.executable, "-c", "import signal; signal.signal(2, signal.SIG_IGN); print(flush=True); signal.pause()"],
         stdout=subprocess.PIPE,
     )
-    hanging.stdout.readline()
+    present(hanging.stdout).readline()
     stopped = subprocess.Popen([sys.executable, "-c", "print(flush=True); input()"], stdin=subprocess.PIPE)
     os.kill(stopped.pid, signal.SIGSTOP)
     _until(lambda: _state(stopped.pid) == "T")
@@ -190,7 +191,7 @@ class Watched:
     def frozen(self, stopped_limit_s: float, silent_limit_s: float) -> str:
         return (
             "no sign of life"
-            if (stopped_limit_s, silent_limit_s, self.looks[-1]) == (2.0, 15.0, pytest.approx(0.3))
+            if (stopped_limit_s, silent_limit_s, self.looks[-1]) == pytest.approx((2.0, 15.0, 0.3))
             else ""
         )
 
@@ -199,7 +200,8 @@ def test_time_for_which_the_supervisor_was_stopped_does_not_count(tmp_path, monk
     clock = Clock()
     monkeypatch.setattr(processes, "time", clock)
     supervisor = Supervisor(load_mission("okeefe_2013"), None, tmp_path)
-    watched = supervisor.children["ekf"].pulse = Watched()
+    watched = Watched()
+    monkeypatch.setattr(supervisor.children["ekf"], "pulse", watched)
     for step_s, frozen in ((0.1, {}), (0.2, {"ekf": "no sign of life"}), (3600.0, {}), (0.25, {})):
         clock.now += step_s
         assert supervisor._frozen() == frozen

@@ -17,6 +17,7 @@ from css_common.epochs import mission_epoch
 from css_common.message_columns import Columns
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
+from css_common.sections import DURATION, EPOCH
 from css_common.shared_sections import conflicts, section_table
 
 if TYPE_CHECKING:
@@ -150,6 +151,7 @@ class Component:
     shared: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[Table] = ()
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
+    _needed_by_host: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, name: str, values: Values) -> None:
         self.name = name
@@ -185,6 +187,11 @@ class Component:
         return ()
 
     @classmethod
+    def asked_for(cls, values: Values) -> Iterable[str]:
+        """Names of all parameters without a default that it or its host cannot do without."""
+        return dict.fromkeys((*cls.needed(values), *cls._needed_by_host))
+
+    @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         """What is wrong between parameters, one message each."""
         return ()
@@ -218,7 +225,7 @@ class Component:
         """One step: the inputs of one stamp (None for what is silent or not due) to the outputs of that stamp."""
         raise NotImplementedError
 
-    def cycles(self, steps: Cycles) -> Mapping[str, Columns] | None:
+    def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
         """Many steps at once, to the messages of all of them by output: the same as `cycle` would give for each.
 
         For those who have the inputs already, as replay has. A component need not offer it: None, and nothing is done.
@@ -247,6 +254,7 @@ class Plant(Component):
 
     finished: bool = False
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io", "lockstep")
+    _needed_by_host: ClassVar[tuple[str, ...]] = (EPOCH.name, DURATION.name)
 
     @classmethod
     def fastest_start(cls, values: Values) -> float:
@@ -267,7 +275,7 @@ class Plant(Component):
 
 def missing_values(component_type: type[Component], values: Values) -> Iterator[str]:
     """What a component needs and has not been given, one message each."""
-    return missing(component_type.table(), values, component_type.needed(values))
+    return missing(component_type.table(), values, component_type.asked_for(values))
 
 
 def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:

@@ -28,10 +28,12 @@ def parse_utc(text: str) -> int:
 def mission_epoch(mission: Values) -> int:
     """Nanoseconds since 1970 UTC of the first step of a case (section mission): a whole second of the days asked for.
 
+    0 in the mission of nodes that ask for no epoch.
+
     Raises:
         ValueError: the epoch is not an ISO 8601 date and time.
     """
-    begin = parse_utc(mission.epoch)
+    begin = parse_utc(mission.epoch) if mission.epoch else 0
     if mission.epoch_spread_days <= 0.0:
         return begin
     from css_common.random_streams import Stream, random_key, uniform4  # compiled, which few missions need for this

@@ -7,6 +7,7 @@ Shared sections stand under `/**`, node parameters under the node's name. A miss
 nobody declares, so each reader checks the whole file here first and a typo dies everywhere.
 """
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -39,10 +40,12 @@ from css_common.schema import (
     Values,
     checked_values,
     flag,
+    missing,
     shaped_values,
     shown,
     unknown_name,
 )
+from css_common.sections import EPOCH
 from css_common.shared_sections import conflicts, shared_parameters
 
 __all__ = [
@@ -126,6 +129,9 @@ class Mission:
         tables = {node.name: node.component.table() for node in self.nodes}
         self._check_keys(tables if guest is None else tables | {guest[0]: guest[1].table()})
         self.events = events_of(_below("events.", given), tables, f"{origin}: {SHARED}")
+        if self.events:
+            with _naming(origin, SHARED):
+                _refuse(missing(known.values(), self.values, (EPOCH.name,)))  # from which the times of events count
         self.criteria = criteria_of(_below("criteria.", given), f"{origin}: {SHARED}")
         self._check_wiring()
         self.remarks = tuple(self._unmeant())
@@ -147,8 +153,9 @@ class Mission:
 
     @property
     def steps(self) -> int:
-        """Number of control cycles to fly."""
-        return round(self.values.mission.duration / self.values.mission.period)
+        """Number of control cycles to fly; 0 in the mission of nodes that nothing paces."""
+        duration = self.values.mission.duration
+        return 0 if math.isnan(duration) else round(duration / self.values.mission.period)
 
     def node(self, name: str) -> Node:
         """The node called `name`.

@@ -70,4 +70,6 @@ def _parameter(p: Parameter) -> Iterator[str]:
 def _shown(p: Parameter) -> str:
     if p.is_array and len(p.default) > _MOST_SHOWN:
         return f"{len(p.default)} values"
+    if p.default != p.default:
+        return "none"
     return {True: "true", False: "false"}[p.default] if p.kind == "flag" else str(p.default)

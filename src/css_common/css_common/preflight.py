@@ -81,6 +81,8 @@ def _line(mission: Mission, node: Node, finding: Finding) -> str:
 
 
 def _events_too_late(mission: Mission) -> Iterator[str]:
+    if not mission.steps:
+        return
     last = (mission.steps - 1) * mission.values.mission.period
     for event in mission.events:
         if event.time > last + 1e-9:

@@ -53,6 +53,8 @@ def _value(value: Any) -> str:
         return str(value).lower()
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(map(_value, value))}]"
+    if value != value:
+        return "(none)"
     return f"{value:g}" if isinstance(value, float) else str(value) or "(empty)"
 
 

@@ -35,7 +35,7 @@ def _descriptor(p: Parameter) -> ParameterDescriptor:
         additional_constraints=p.expectation() + ("" if p.tunable else "; fixed at start"),
         read_only=not p.tunable,
     )
-    if p.kind == "real" and (p.low is not None or p.high is not None):
+    if p.kind == "real" and not p.example and (p.low is not None or p.high is not None):  # NaN would be outside
         descriptor.floating_point_range = [
             FloatingPointRange(
                 from_value=-sys.float_info.max if p.low is None else float(p.low),

@@ -123,6 +123,8 @@ class Parameter(Generic[T]):
             return value
         if isinstance(value, bool):
             raise TypeError
+        if self.example and kind == "real" and isinstance(value, float) and value != value:
+            return math.nan
         return self._in_bounds(_whole(value) if kind == "integer" else _real(value))
 
     def _in_bounds(self, number: Any) -> Any:
@@ -190,7 +192,7 @@ def _real(value: Any) -> float:
 
 def real(
     name: str,
-    default: float,
+    default: float | None,
     unit: str,
     description: str,
     *,
@@ -198,9 +200,16 @@ def real(
     high: float | None = None,
     open_low: bool = False,
     tunable: bool = False,
+    example: str = "",
 ) -> Parameter[float]:
-    """A number. `open_low` excludes the lower bound itself; `tunable` allows a change in flight."""
-    return Parameter(name, "real", float(default), unit, description, low, high, open_low=open_low, tunable=tunable)
+    """A number. `open_low` excludes the lower bound itself; `tunable` allows a change in flight.
+
+    With an `example` in the place of the default, whoever needs the parameter asks for it, and it is NaN till then.
+    """
+    value = math.nan if default is None else float(default)
+    return Parameter(
+        name, "real", value, unit, description, low, high, open_low=open_low, tunable=tunable, example=example
+    )
 
 
 def integer(
@@ -229,9 +238,9 @@ def choice(
     return Parameter(name, "choice", default, "-", description, choices=choices, tunable=tunable, example=example)
 
 
-def text(name: str, default: str, description: str) -> Parameter[str]:
-    """A text."""
-    return Parameter(name, "text", default, "-", description)
+def text(name: str, default: str, description: str, *, example: str = "") -> Parameter[str]:
+    """A text; with an `example` the default is that for none."""
+    return Parameter(name, "text", default, "-", description, example=example)
 
 
 def reals(
@@ -288,6 +297,15 @@ class Values(SimpleNamespace):
         value: T = attrgetter(parameter.name)(self)
         return value
 
+    def __contains__(self, parameter: Parameter[Any]) -> bool:
+        """Whether it is in the table."""
+        at: Any = self
+        for name in parameter.name.split("."):
+            if not hasattr(at, name):
+                return False
+            at = getattr(at, name)
+        return True
+
     def items(self, prefix: str = "") -> Iterator[tuple[str, Any]]:
         """Dotted names and values."""
         for key, value in vars(self).items():
@@ -341,10 +359,15 @@ def missing(table: Iterable[Parameter], values: Values, needed: Iterable[str]) -
     specifications = {p.name: p for p in table}
     for name in needed:
         p = specifications[name]
-        value = values[p]
-        if value == p.default if isinstance(value, str) else not np.size(value):
+        if not _is_given(p, values[p]):
             some = replace(p, choices=tuple(word for word in p.choices if word != p.default))
             yield f"{name}: missing, expected {some.expectation()}, for instance {p.example}"
+
+
+def _is_given(p: Parameter[Any], value: Any) -> bool:
+    if isinstance(value, str):
+        return bool(value != p.default)
+    return not math.isnan(value) if isinstance(value, float) else bool(np.size(value))
 
 
 def unknown_name(name: str, known: Iterable[str]) -> str:

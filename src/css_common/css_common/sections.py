@@ -24,7 +24,7 @@ _LONGEST_NAME = 100  # [bytes] with what is added to it a file name of 255 bytes
 _MOST_STEPS = 10**9
 _LOWEST = 100e3  # altitude [m] below which the atmosphere lets nothing orbit
 
-EPOCH = text("mission.epoch", "2013-06-01T00:00:00Z", "UTC instant of the first step")
+EPOCH = text("mission.epoch", "", "UTC instant of the first step", example='mission: {epoch: "2026-06-01T00:00:00Z"}')
 EPOCH_SPREAD = real(
     "mission.epoch_spread_days",
     0.0,
@@ -33,7 +33,16 @@ EPOCH_SPREAD = real(
     low=0.0,
     high=20_000.0,
 )
-DURATION = real("mission.duration", 5550.0, "s", "simulated time to fly", low=0.0, open_low=True, high=3.2e7)
+DURATION = real(
+    "mission.duration",
+    None,
+    "s",
+    "simulated time to fly",
+    low=0.0,
+    open_low=True,
+    high=3.2e7,
+    example="mission: {duration: 5550.0}",
+)
 PERIOD = real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0)
 SEED = integer("mission.seed", 1, "-", "key of all random streams", low=0, high=2**63 - 1)
 CASE = integer("mission.case", 0, "-", "case number within the seed", low=0, high=2**32 - 1)
@@ -60,25 +69,49 @@ ALTITUDE = real("orbit.altitude", 0.0, "m", "semi-major axis above the equatoria
 ECCENTRICITY = real("orbit.eccentricity", 0.0, "-", "eccentricity", low=0.0, high=0.9)
 LAUNCH_LATITUDE = real(
     "orbit.launch.latitude_deg",
-    69.29,
+    None,
     "deg",
     "geodetic latitude where a ballistic arc begins",
     low=-90.0,
     high=90.0,
+    example="orbit: {launch: {latitude_deg: 69.29}}",
 )
-LAUNCH_LONGITUDE = real("orbit.launch.longitude_deg", 16.02, "deg", "its longitude, east", low=-180.0, high=360.0)
+LAUNCH_LONGITUDE = real(
+    "orbit.launch.longitude_deg",
+    None,
+    "deg",
+    "its longitude, east",
+    low=-180.0,
+    high=360.0,
+    example="orbit: {launch: {longitude_deg: 16.02}}",
+)
 LAUNCH_HEIGHT = real("orbit.launch.height", 0.0, "m", "its height above the ellipsoid", low=-500.0, high=100e3)
 LAUNCH_AZIMUTH = real(
     "orbit.launch.azimuth_deg",
-    330.0,
+    None,
     "deg",
     "direction of the arc's start from north over east",
     low=-360.0,
     high=360.0,
+    example="orbit: {launch: {azimuth_deg: 330.0}}",
 )
-LAUNCH_ELEVATION = real("orbit.launch.elevation_deg", 80.0, "deg", "its elevation", low=10.0, high=90.0)
+LAUNCH_ELEVATION = real(
+    "orbit.launch.elevation_deg",
+    None,
+    "deg",
+    "its elevation",
+    low=10.0,
+    high=90.0,
+    example="orbit: {launch: {elevation_deg: 80.0}}",
+)
 LAUNCH_APOGEE = real(
-    "orbit.launch.apogee", 169e3, "m", "height of its apogee above the ellipsoid", low=1e3, high=2000e3
+    "orbit.launch.apogee",
+    None,
+    "m",
+    "height of its apogee above the ellipsoid",
+    low=1e3,
+    high=2000e3,
+    example="orbit: {launch: {apogee: 169.0e+3}}",
 )
 
 ORBIT: Table = (
@@ -133,9 +166,21 @@ WHEEL_AXES = reals(
     columns=3,
     example="wheels: {axes: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]}",
 )
-WHEEL_INERTIA = real("wheels.inertia", 0.001, "kg m^2", "spin inertia of each wheel", low=0.0, open_low=True)
-WHEEL_MAX_TORQUE = real("wheels.max_torque", 0.030, "N m", "torque limit of each wheel", low=0.0)
-WHEEL_MAX_SPEED = real("wheels.max_speed_rpm", 6000.0, "rpm", "speed limit of each wheel", low=0.0)
+WHEEL_INERTIA = real(
+    "wheels.inertia",
+    None,
+    "kg m^2",
+    "spin inertia of each wheel",
+    low=0.0,
+    open_low=True,
+    example="wheels: {inertia: 0.001}",
+)
+WHEEL_MAX_TORQUE = real(
+    "wheels.max_torque", None, "N m", "torque limit of each wheel", low=0.0, example="wheels: {max_torque: 0.030}"
+)
+WHEEL_MAX_SPEED = real(
+    "wheels.max_speed_rpm", None, "rpm", "speed limit of each wheel", low=0.0, example="wheels: {max_speed_rpm: 6000.0}"
+)
 
 WHEELS: Table = (
     WHEELS_FITTED,
@@ -256,6 +301,25 @@ def name_for_files(text: str) -> str:
     return kept.encode()[:_LONGEST_NAME].decode(errors="ignore")
 
 
+def needed_of_orbit(values: Values) -> tuple[str, ...]:
+    """What a component cannot do without that has to know where the spacecraft is."""
+    launch = (LAUNCH_LATITUDE, LAUNCH_LONGITUDE, LAUNCH_AZIMUTH, LAUNCH_ELEVATION, LAUNCH_APOGEE)
+    of_source = launch if values[ORBIT_SOURCE] == "ballistic" else ()
+    return tuple(p.name for p in (ORBIT_SOURCE, EPOCH, *of_source))
+
+
+def needed_of_wheels(values: Values) -> tuple[str, ...]:
+    """What a component cannot do without that turns the wheels, if there are any."""
+    if not values[WHEELS_FITTED]:
+        return ()
+    return tuple(p.name for p in (WHEEL_AXES, WHEEL_INERTIA, WHEEL_MAX_TORQUE, WHEEL_MAX_SPEED))
+
+
+def needed_of_wheel_momentum(values: Values) -> tuple[str, ...]:
+    """What a component cannot do without that counts the momentum of the wheels that there are."""
+    return (WHEEL_INERTIA.name,) if len(wheel_axes(values)) else ()
+
+
 def wheel_axes(values: Values) -> np.ndarray:
     """Spin axes (N, 3) of the reaction wheels that the spacecraft carries, in b; none without wheels."""
     return values[WHEEL_AXES] if values[WHEELS_FITTED] else np.zeros((0, 3))
@@ -286,22 +350,25 @@ def _mission_conflicts(mission: Values) -> Iterator[str]:
             f"mission.name: {shown(mission.name)} given, expected a name for files of at most {_LONGEST_NAME} bytes: "
             "letters, digits, spaces and _-+.,=() and the like, the first a letter or digit"
         )
-    steps = mission.duration / mission.period
-    if not 1.0 - 1e-6 <= steps <= _MOST_STEPS:
+    duration = 0.0 if math.isnan(mission.duration) else mission.duration
+    steps = duration / mission.period
+    if duration and not 1.0 - 1e-6 <= steps <= _MOST_STEPS:
         yield (
             f"mission.duration: {mission.duration:g} s given, {steps:.3g} steps of mission.period {mission.period:g} s,"
             f" expected 1 to {_MOST_STEPS}"
         )
+    if not mission.epoch:
+        return
     try:
         begin = parse_utc(mission.epoch)
     except ValueError as error:
         yield f"mission.epoch: {error}"
         return
     spread_s = mission.epoch_spread_days * 86_400.0
-    if begin < 0 or begin + (spread_s + mission.duration) * 1e9 >= _LAST_STAMP_NS:
+    if begin < 0 or begin + (spread_s + duration) * 1e9 >= _LAST_STAMP_NS:
         yield (
-            f"mission.epoch: {mission.epoch} given, expected a flight of {mission.duration:g} s between "
-            "1970-01-01 and 2038-01-19: the seconds of a ROS stamp have 32 bits"
+            f"mission.epoch: {mission.epoch} given, expected {f'a flight of {duration:g} s' if duration else 'one'} "
+            "between 1970-01-01 and 2038-01-19: the seconds of a ROS stamp have 32 bits"
         )
 
 

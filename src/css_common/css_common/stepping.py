@@ -116,14 +116,14 @@ class Stepper:
     @property
     def offers_steps(self) -> bool:
         """The component can be stepped many times at once."""
-        return type(self.component).cycles is not Component.cycles
+        return type(self.component).cycle_through is not Component.cycle_through
 
     def steps(self, cycles: Cycles) -> list[tuple[Port, list[tuple[int, bytes]]]] | None:
         """What the component gives at many quiet steps: stamp and serialised message of each, by output.
 
         None: it has to be stepped one by one, from where it was before.
         """
-        outgoing = self.component.cycles(cycles)
+        outgoing = self.component.cycle_through(cycles)
         if outgoing is None:
             return None
         given = []

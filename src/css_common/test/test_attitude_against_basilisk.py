@@ -3,6 +3,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from css_common.vectors import norm
 
 VECTORS = json.loads((Path(__file__).parent / "data" / "mrp_kinematics.json").read_text(encoding="utf-8"))
 # Both sides round a dozen operations on numbers of order one.
-EXACT = {"rtol": 0.0, "atol": 5e-15}
+EXACT: dict[str, Any] = {"rtol": 0.0, "atol": 5e-15}
 
 
 @pytest.fixture(params=VECTORS["cases"], ids=range(len(VECTORS["cases"])))

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from presence import present
 
 from css_common import domains
 from css_common.domains import FLIGHT, JOINED, TEST, DomainError, Holder, flights, hold_free, holder_of, own
@@ -31,7 +32,7 @@ class Other:
         self.process = subprocess.Popen(
             [sys.executable, "-c", program], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
-        self.domain = int(self.process.stdout.readline())
+        self.domain = int(present(self.process.stdout).readline())
 
     def end(self) -> None:
         self.process.communicate()
@@ -56,14 +57,14 @@ def test_tests_and_flights_never_meet(start):
     numbers = [other.domain for other in held] + [int(HERE["ROS_DOMAIN_ID"])]
     assert len(set(numbers)) == len(numbers)
     assert all(1 <= number <= 101 for number in numbers)
-    assert [holder_of(other.domain).kind for other in held] == [TEST, TEST, FLIGHT, FLIGHT]
+    assert [present(holder_of(other.domain)).kind for other in held] == [TEST, TEST, FLIGHT, FLIGHT]
     running = {flight.domain for flight in flights()}
     assert running.isdisjoint(other.domain for other in held[:2])
     assert running.issuperset(other.domain for other in held[2:])
 
 
 def test_environment_of_the_tests():
-    assert holder_of(int(HERE["ROS_DOMAIN_ID"])).pid == os.getpid()
+    assert present(holder_of(int(HERE["ROS_DOMAIN_ID"]))).pid == os.getpid()
     assert os.environ["ROS_PYTHON_CHECK_FIELDS"] == "1"
     assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     assert not Path(os.environ["ROS_LOG_DIR"]).is_relative_to(ROOT)
@@ -72,8 +73,8 @@ def test_environment_of_the_tests():
 def test_a_holder_tells_what_it_does(start):
     other = start(FLIES)
     holder = holder_of(other.domain)
-    assert holder[:4] == (other.domain, other.process.pid, FLIGHT, "tumble")
-    assert holder.recording == "/bags/x"
+    assert present(holder)[:4] == (other.domain, other.process.pid, FLIGHT, "tumble")
+    assert present(holder).recording == "/bags/x"
     assert str(holder).startswith(f"flight tumble (pid {other.process.pid}, since 20")
 
 
@@ -92,7 +93,7 @@ def test_a_killed_holder_leaves_nothing(start):
     other.process.wait()
     assert holder_of(other.domain) is None
     with own({}, "mine", asked=str(other.domain)) as held:
-        assert holder_of(held.domain).pid == os.getpid()
+        assert present(holder_of(held.domain)).pid == os.getpid()
     assert holder_of(held.domain) is None
 
 
@@ -107,7 +108,7 @@ def test_a_child_of_a_holder_does_not_keep_the_domain():
 def test_a_flight_of_a_test_flies_in_the_domain_of_the_test():
     with own(HERE, "mine") as held:
         assert held.domain == int(HERE["ROS_DOMAIN_ID"])
-    assert holder_of(held.domain).kind == TEST
+    assert present(holder_of(held.domain)).kind == TEST
     with pytest.raises(DomainError, match="is held by test"):
         own({**HERE, "SUNPOINT_DOMAIN_HOLDER": "1"}, "mine")
 
@@ -142,8 +143,8 @@ def test_users_share_the_domains_of_a_machine(start, monkeypatch):
     other = start(IMPORTS + AS_ANOTHER_USER + HOLDS)
     monkeypatch.setattr(domains, "_notes", lambda pid: (_ for _ in ()).throw(PermissionError()))
     holder = holder_of(other.domain)
-    assert (holder.pid, holder.kind) == (other.process.pid, "")
-    assert holder.name.startswith(sys.executable)
+    assert (present(holder).pid, present(holder).kind) == (other.process.pid, "")
+    assert present(holder).name.startswith(sys.executable)
     with pytest.raises(DomainError, match=f"is held by process .*pid {other.process.pid}"):
         own({}, "mine", asked=str(other.domain))
     mine = own({}, "mine")

@@ -18,7 +18,7 @@ from css_msgs.msg import CssVoltages, SunEstimate
 ALONE = """\
 /**:
   ros__parameters:
-    mission: {name: alone, period: 0.1}
+    mission: {epoch: '2013-06-01T00:00:00Z', name: alone, duration: 10.0, period: 0.1}
     graph: {nodes: [testbed/source, testbed/estimator]}
 estimator:
   ros__parameters: {use_gyro: false}

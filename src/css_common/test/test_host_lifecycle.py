@@ -16,6 +16,7 @@ from css_msgs.msg import CssVoltages, SpacecraftState, SunEstimate
 TEXT = """\
 /**:
   ros__parameters:
+    mission: {epoch: '2013-06-01T00:00:00Z', duration: 10.0}
     graph: {nodes: [testbed/source, testbed/gyro, testbed/estimator]}
 estimator:
   ros__parameters: {use_gyro: false}

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters of a hosted component: declared with unit and range, refused with a reason, changed in flight."""
 
+from typing import Any
+
 import pytest
 from rcl_interfaces.msg import ParameterType
 from rcl_interfaces.srv import DescribeParameters, GetParameters, SetParameters, SetParametersAtomically
@@ -15,6 +17,7 @@ from css_common.schema import ParameterError
 TEXT = """\
 /**:
   ros__parameters:
+    mission: {epoch: '2013-06-01T00:00:00Z', duration: 10.0}
     graph: {nodes: [testbed/source, testbed/estimator]}
 estimator:
   ros__parameters: {use_gyro: false, gain: 2.0, labels: [a, b]}
@@ -97,7 +100,7 @@ def test_component_keeps_its_state_when_it_is_tuned(bench, node):
 
 
 # ROS checks type and range by itself first, in its own words.
-REFUSED = {
+REFUSED: dict[str, list[tuple[Any, str]]] = {
     "gain": [
         (11.0, "out of range Min: 0.0, Max: 10.0"), (-1e-3, "out of range Min: 0.0, Max: 10.0"),
         (float("nan"), "out of range"), (float("inf"), "out of range"), (3, "expected 'Type.DOUBLE'"),
@@ -183,8 +186,8 @@ def test_tuning_that_fails_is_counted_and_the_node_lives(bench, node, monkeypatc
     assert node.component.values.gain == 4.0
 
 
-def overridden(*arguments: str) -> ComponentNode:
-    """A node under a command line of its own."""
+def overridden(*arguments: str) -> dict[str, Any]:
+    """Values of a node under a command line of its own."""
     context = Context()
     context.init(args=["--ros-args", *arguments])
     mission = mission_from_text(TEXT, "bench.yaml")

@@ -16,6 +16,7 @@ from css_msgs.msg import CssVoltages, SunEstimate
 TEXT = """\
 /**:
   ros__parameters:
+    mission: {duration: 10.0, epoch: '2013-06-01T00:00:00Z'}
     graph: {nodes: [testbed/source, testbed/gyro, testbed/estimator]}
 estimator:
   ros__parameters: {use_gyro: false}

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A kernel gives the same to Python and to kernels; constants that it is called with make no copies of it."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -57,7 +57,8 @@ def test_calls_from_kernels_give_what_calls_from_python_give(caller):
 
 def test_constants_in_calls_make_no_copies_of_a_kernel():
     point = typeof(Point(1.0, 2.0))
-    templates = [weighted.get_call_template((point, types.literal(weight)), {})[0] for weight in (1, 2, 3)]
+    dispatcher: Any = weighted
+    templates = [dispatcher.get_call_template((point, types.literal(weight)), {})[0] for weight in (1, 2, 3)]
     versions = [signature.args for signature in templates[-1].cases if signature.args[0] == point]
     assert {weight for _, weight, _ in versions} == {types.int64}
     assert len(templates[-1].cases) == len(templates[0].cases)

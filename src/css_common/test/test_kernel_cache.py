@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from presence import present
 
 import css_common.kernel
 import css_common.kernel_sources
@@ -43,7 +44,7 @@ class Project:
             (root / package).mkdir()
             (root / package / "__init__.py").touch()
         for module in (css_common.kernel, css_common.kernel_sources, css_common.places):
-            shutil.copy(module.__file__, root / "css_common")
+            shutil.copy(present(module.__file__), root / "css_common")
         self.write_inner("1.0")
         (root / "css_sim" / "outer.py").write_text(OUTER)
 

@@ -25,7 +25,8 @@ def mission_of(lines: str = "", *overrides: str, nodes: str = ""):
 
 def graph_of(*entries: str, lines: str = ""):
     """A mission of other nodes."""
-    text = f"/**: {{ros__parameters: {{graph: {{nodes: {list(entries)}, estimator: estimator}}, {lines}}}}}"
+    flight = "mission: {duration: 1.0, epoch: 2013-06-01}"
+    text = f"/**: {{ros__parameters: {{{flight}, graph: {{nodes: {list(entries)}, estimator: estimator}}, {lines}}}}}"
     return mission_from_text(text, "bench.yaml")
 
 

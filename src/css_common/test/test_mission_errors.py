@@ -15,7 +15,7 @@ from css_common.sections import name_for_files
 HEAD = """\
 /**:
   ros__parameters:
-    mission: {name: bench, duration: 1.0, period: 0.1}
+    mission: {epoch: '2013-06-01T00:00:00Z', name: bench, duration: 1.0, period: 0.1}
     graph: {nodes: [testbed/source, testbed/gyro, testbed/estimator, testbed/controller], estimator: estimator}
 """
 
@@ -142,7 +142,7 @@ def test_shared_sections(lines):
 
 
 def test_epoch_that_is_no_instant():
-    text = HEAD.replace("duration: 1.0", "epoch: tomorrow")
+    text = HEAD.replace("epoch: '2013-06-01T00:00:00Z'", "epoch: tomorrow")
     assert "bench.yaml: /**: mission.epoch: 'tomorrow' is not a UTC instant" in refusal(text)
 
 
@@ -362,7 +362,7 @@ MISSION_ERRORS = {
     "duration: 0.05": "mission.duration: 0.05 s given, 0.5 steps of mission.period 0.1 s, expected 1 to",
     "duration: 3.2e+7\n      period: 0.001": "mission.duration: 3.2e+07 s given, 3.2e+10 steps",
     "duration: 1e+300": "mission.duration: 1e+300 given, expected above 0 and at most 3.2e+07 [s]",
-    "epoch: 9999-12-31": "9999-12-31 given, expected a flight of 5550 s between 1970-01-01 and 2038-01-19: ",
+    "epoch: 9999-12-31": "9999-12-31 given, expected one between 1970-01-01 and 2038-01-19: ",
     "epoch: 9999-12-31T23:59:59-23:59": "between 1970-01-01 and 2038-01-19",
     "epoch: 0001-01-01T00:00:00+23:59": "between 1970-01-01 and 2038-01-19",
     "epoch: 2038-01-19T03:14:08Z": "between 1970-01-01 and 2038-01-19",

@@ -223,7 +223,8 @@ def test_three_processes_fly_a_mission(start, bench, mission_file, tmp_path):
 
 
 def test_plant_that_fails_ends_with_code_1(start):
-    code, _, err = start("source", "--ros-args", "-p", "fails_at:=2").end()
+    flight = ("-p", "mission.duration:=1.0", "-p", "mission.epoch:='2013-06-01T00:00:00Z'")
+    code, _, err = start("source", "--ros-args", *flight, "-p", "fails_at:=2").end()
     assert code == 1
     assert "RuntimeError: the plant is out of order" in err
 

@@ -2,13 +2,16 @@
 """Ordinary parameter files, as a node of ours reads them and as a plain node of rclpy does: the same values."""
 
 import array
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from rclpy.context import Context
 from rclpy.node import Node
+from ros_values import values_of
 
 from css_common.mission import find_component
 from css_common.mission_file import MissionError
@@ -21,14 +24,18 @@ DEFAULTS = {p.name: p.default for p in ESTIMATOR.table()}
 NAMED = ["-r", "__node:=ekf"]
 
 
-def read_by_ros(arguments: list[str]) -> tuple[str, dict]:
+def read_by_ros(arguments: list[str]) -> tuple[str, Mapping[str, Any]]:
     """Full name of a plain node with this command line, and what it was given."""
     context = Context()
     context.init(args=["--ros-args", *arguments])
     try:
-        options = {"start_parameter_services": False, "automatically_declare_parameters_from_overrides": True}
-        node = Node("estimator", context=context, **options)
-        values = {name: p.value for name, p in node.get_parameters_by_prefix("").items()}
+        node = Node(
+            "estimator",
+            context=context,
+            start_parameter_services=False,
+            automatically_declare_parameters_from_overrides=True,
+        )
+        values = values_of(node)
         full_name = node.get_fully_qualified_name()
         node.destroy_node()
     finally:
@@ -36,7 +43,7 @@ def read_by_ros(arguments: list[str]) -> tuple[str, dict]:
     return full_name, {k: list(v) if isinstance(v, array.array) else v for k, v in values.items()}
 
 
-def read_by_us(arguments: list[str]) -> tuple[str, dict]:
+def read_by_us(arguments: list[str]) -> tuple[str, Mapping[str, Any]]:
     """The same of a node of ours."""
     arguments = ["--ros-args", *arguments]
     parsed = parse_arguments("estimator", arguments)
@@ -44,7 +51,7 @@ def read_by_us(arguments: list[str]) -> tuple[str, dict]:
     return f"{parsed.namespace.rstrip('/')}/{parsed.name}", mission.node_of(ESTIMATOR, parsed.name).canonical
 
 
-def compare(arguments: list[str]) -> dict:
+def compare(arguments: list[str]) -> Mapping[str, Any]:
     """What both read, after it has turned out to be the same; values that no file gives are defaults."""
     full_name, theirs = read_by_ros(arguments)
     our_name, ours = read_by_us(arguments)
@@ -164,7 +171,14 @@ def test_section_of_this_node_in_another_namespace_is_remarked(write):
     assert mission.node_of(ESTIMATOR, "estimator").values.gain == 1.0
 
 
-MISSION = section("/**", **{"graph.nodes": "[testbed/source, testbed/estimator]"})
+MISSION = section(
+    "/**",
+    **{
+        "mission.duration": 1.0,
+        "mission.epoch": "2013-06-01T00:00:00Z",
+        "graph.nodes": "[testbed/source, testbed/estimator]",
+    },
+)
 
 
 def test_mission_may_hold_sections_of_nodes_that_are_none_of_its_graph(write):

@@ -5,6 +5,8 @@ import re
 import threading
 from types import SimpleNamespace
 
+from noting import noted
+
 from css_common import progress_lines
 from css_common.progress_lines import ProgressLines, still_working
 from css_common.testing import DEADLINE
@@ -30,7 +32,7 @@ def test_what_takes_long_says_so_until_it_ends(capsys, monkeypatch):
     told = threading.Semaphore(0)
     monkeypatch.setattr(progress_lines, "EVERY", 0.0)
     say = progress_lines._say
-    monkeypatch.setattr(progress_lines, "_say", lambda line: (say(line), told.release()))
+    monkeypatch.setattr(progress_lines, "_say", lambda line: noted([], say(line), told.release))
     with still_working("replaying bags/a"):
         assert told.acquire(timeout=DEADLINE)
     lines = capsys.readouterr().err.splitlines()

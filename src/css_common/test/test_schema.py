@@ -185,11 +185,13 @@ def test_nested_values_are_plain_attributes():
     values = nested({"a.b.c": 1, "a.b.d": 2, "e": 3})
     assert (values.a.b.c, values.a.b.d, values.e) == (1, 2, 3)
     assert isinstance(values.a, Values)
+    assert real("a.b.c", 0.0, "-", "") in values and real("e", 0.0, "-", "") in values
+    assert all(real(name, 0.0, "-", "") not in values for name in ("a.b.e", "b", "a.b.c.d"))
 
 
 def test_specifications_cannot_change():
     with pytest.raises(dataclasses.FrozenInstanceError):
-        GAIN.low = -1.0
+        setattr(GAIN, "low", -1.0)  # noqa: B010
 
 
 def test_what_has_no_default_is_missing_until_it_is_given():

@@ -19,7 +19,7 @@ from css_msgs.msg import CssVoltages, SunEstimate
 TEXT = """\
 /**:
   ros__parameters:
-    mission: {name: unmet, period: 0.1}
+    mission: {epoch: '2013-06-01T00:00:00Z', name: unmet, duration: 10.0, period: 0.1}
     graph: {nodes: [testbed/source, testbed/gyro, testbed/estimator]}
 """
 T0 = 1_370_044_800_000_000_000

@@ -2,6 +2,7 @@
 """Tuples of floats against numpy's arrays."""
 
 import math
+from typing import Any
 
 import numpy as np
 from hypothesis import given
@@ -14,7 +15,7 @@ components = st.floats(-1e3, 1e3, allow_subnormal=False)
 vec3 = st.tuples(components, components, components)
 mat3 = st.tuples(vec3, vec3, vec3)
 # three products and two sums of numbers up to 1e6
-ROUNDING = {"rtol": 1e-12, "atol": 1e-9}
+ROUNDING: dict[str, Any] = {"rtol": 1e-12, "atol": 1e-9}
 
 
 @given(vec3, vec3, components)

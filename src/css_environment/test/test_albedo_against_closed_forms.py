@@ -8,6 +8,7 @@ import pytest
 from celestial import orbit_period
 from scipy.integrate import quad
 
+from css_common.vectors import mat3
 from css_environment.albedo import Screen, albedo_output, new_workspace, plane_screen, soft_screen, transmission
 from css_environment.constants import EARTH_RADIUS
 from css_environment.earth_light import (
@@ -193,7 +194,7 @@ def test_largest_output_along_the_papers_orbits(inclination, half_view, plane, e
     cells, screen = cells_of(normals, normals[:, 2]), plane_screen((0.0, 0.0, plane))
     cos_half_view = math.cos(math.radians(half_view))
     rng = np.random.default_rng(8)
-    attitudes = [tuple(map(tuple, np.linalg.qr(rng.normal(size=(3, 3)))[0])) for _ in range(200)]
+    attitudes = [mat3(np.linalg.qr(rng.normal(size=(3, 3)))[0]) for _ in range(200)]
     peak = 0.0
     for t in np.arange(0.0, orbit_period(orbit), 60.0):
         state = at(ephemeris, float(t))

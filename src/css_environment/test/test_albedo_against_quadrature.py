@@ -162,7 +162,8 @@ def test_reflectivities_drawn_for_each_cell_of_the_grid():
     for case, (r_n, sun_n, rng) in enumerate(geometries(8, seed=22)):
         draw_reflectivity(grid, random_key(5, case), False, reflectivity)
         dcm_en, dcm_bn = rotation(rng), rotation(rng)
-        expected = quadrature(*earth_patches(r_n, sun_n, dcm_en, reflectivity), layout, dcm_bn)
+        directions, weight = earth_patches(r_n, sun_n, dcm_en, reflectivity)
+        expected = quadrature(directions, weight, layout, dcm_bn)
         np.testing.assert_allclose(
             fast.look(r_n, sun_n, reflectivity, dcm_en).output(layout, dcm_bn), expected, atol=0.003
         )

@@ -6,6 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from css_common.attitude import rotation_vector_to_dcm
+from css_common.vectors import mat3
 from css_environment.albedo import albedo_output, new_workspace, plane_screen, soft_screen
 from css_environment.albedo_slope import albedo_slopes
 from css_environment.constants import EARTH_RADIUS
@@ -61,18 +62,17 @@ def test_slopes_are_those_of_the_light(light, cells, screen, half_view_deg):
         def output(turn, dcm=dcm):
             out = np.zeros(len(cells))
             turned = np.array(rotation_vector_to_dcm(tuple(turn))) @ dcm
-            albedo_output(light, cells, screen, edge, tuple(map(tuple, turned.tolist())), work, out)
+            albedo_output(light, cells, screen, edge, mat3(turned), work, out)
             return out
 
-        albedo_slopes(light, cells, screen, edge, tuple(map(tuple, dcm.tolist())), slopes)
+        albedo_slopes(light, cells, screen, edge, mat3(dcm), slopes)
         steps = STEP * np.eye(3)
         numeric = np.stack([(output(step) - output(-step)) / (2.0 * STEP) for step in steps], axis=1)
         off.append(slopes - numeric)
         size.append(numeric)
-    off, size = np.array(off), np.array(size)
-    assert np.sqrt(np.mean(size**2)) > 0.015
+    assert np.sqrt(np.mean(np.square(size))) > 0.015
     # soft edges have corners, where a difference lies between the slopes on both sides
-    assert np.sqrt(np.mean(off**2)) < 0.01 * np.sqrt(np.mean(size**2))
+    assert np.sqrt(np.mean(np.square(off))) < 0.01 * np.sqrt(np.mean(np.square(size)))
     assert np.abs(off).max() < 0.01
 
 

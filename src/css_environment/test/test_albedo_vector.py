@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 
+from css_common.vectors import scale
 from css_environment.albedo import albedo_output, new_workspace, plane_screen, soft_screen, transmission
 from css_environment.albedo_vector import MODELS, albedo_vector, earth_light_sources, lit_cap, nadir_vector
 from css_environment.constants import EARTH_RADIUS
@@ -84,7 +85,7 @@ def test_scale_with_flux_and_reflectivity_of_the_place():
     for latitude in (-80.0, -12.5, 0.0, 33.0, 66.6, 80.0):
         a = math.radians(latitude)
         up = (math.cos(a), 0.0, math.sin(a))
-        r_n = tuple(R * c for c in up)
+        r_n = scale(R, up)
         magnitude = np.linalg.norm(albedo_vector(r_n, up, 0.97, IDENTITY, table))
         assert magnitude == pytest.approx(0.97 * ratio2 * reflectivity_at(table, up), rel=1e-6)
         p2 = (3.0 * math.sin(a) ** 2 - 1.0) / 2.0
@@ -131,7 +132,7 @@ def test_cells_receive_the_vector_through_view_and_collar(model):
         size = np.linalg.norm(vector)
         passed = [transmission(screen, side, tuple(vector / size)) for side in cells["side"]]
         # the patch is 0.6 deg wide: that much of it may be beyond an edge
-        np.testing.assert_allclose(output, np.maximum(normals @ vector, 0.0) * passed, atol=0.01 * size)
+        np.testing.assert_allclose(output, np.maximum(normals @ vector, 0.0) * passed, atol=0.01 * float(size))
 
 
 @pytest.mark.parametrize(

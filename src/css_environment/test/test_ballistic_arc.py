@@ -76,8 +76,18 @@ def test_a_site_above_its_apogee_is_refused():
 
 
 def test_a_mission_may_fly_a_ballistic_arc():
+    launch = {
+        "latitude_deg": 69.29,
+        "longitude_deg": 16.02,
+        "azimuth_deg": 330.0,
+        "elevation_deg": 80.0,
+        "apogee": 90e3,
+    }
     values = default_values(
-        (*MISSION, *ORBIT), orbit__source="ballistic", mission__epoch="2006-07-01T06:39:00Z", orbit__launch__apogee=90e3
+        (*MISSION, *ORBIT),
+        orbit__source="ballistic",
+        mission__epoch="2006-07-01T06:39:00Z",
+        **{f"orbit__launch__{key}": value for key, value in launch.items()},
     )
     environment = MissionEnvironment(values, field=False)
     radii = [np.linalg.norm(environment.at(t).r_n) for t in np.arange(0.0, 300.0, 1.0)]

@@ -106,7 +106,8 @@ def test_no_text_passes_for_a_set_and_none_makes_the_checks_crash(text, place, c
 def values(**changes):
     table = (*MISSION, *ORBIT)
     circle = {"orbit.source": "elements", "orbit.altitude": 400e3}
-    canonical = {p.name: p.default for p in table} | circle | changes
+    flight = {"mission.epoch": "2013-06-01T00:00:00Z", "mission.duration": 5550.0}
+    canonical = {p.name: p.default for p in table} | flight | circle | changes
     return shaped_values(table, canonical)
 
 
@@ -140,8 +141,10 @@ def test_orbits_that_models_do_not_reach():
 
 def test_arcs_that_end_in_the_ground_or_are_none():
     arc = {"orbit.source": "ballistic", "mission.epoch": "2006-07-01T06:39:00Z", "mission.period": 0.1}
+    arc |= {"orbit.launch.latitude_deg": 69.29, "orbit.launch.longitude_deg": 16.02, "orbit.launch.azimuth_deg": 330.0}
+    arc |= {"orbit.launch.elevation_deg": 80.0, "orbit.launch.apogee": 169e3}
     assert list(orbit_findings(values(**arc, **{"mission.duration": 374.0}))) == []
     (deep,) = orbit_findings(values(**arc, **{"mission.duration": 500.0}))
     assert "km below the ground" in deep.text and math.isfinite(float(deep.text.split(" is ")[1].split()[0]))
-    (none,) = orbit_findings(values(**arc, **{"orbit.launch.height": 2000.0, "orbit.launch.apogee": 1500.0}))
+    (none,) = orbit_findings(values(**arc | {"orbit.launch.height": 2000.0, "orbit.launch.apogee": 1500.0}))
     assert none.refused and none.text.startswith("orbit.launch.apogee")

@@ -3,6 +3,7 @@
 
 import numpy as np
 from okeefe_spacecraft import okeefe_values
+from presence import present
 from scipy.spatial.transform import Rotation
 
 from css_common.attitude import mrp_to_dcm
@@ -111,7 +112,7 @@ class Run:
 
     def check(self):
         """Whatever came in, what goes out is sane."""
-        s, p = self.solution, self.memory.covariance
+        s, p = present(self.solution), self.memory.covariance
         assert np.isfinite([*s.sigma_bn, *s.omega_bn_b, *s.bias_b, s.age, s.nis]).all()
         assert np.linalg.norm(s.sigma_bn) <= 1.0 + 1e-9
         assert np.isfinite(p).all() and np.array_equal(p, p.T)
@@ -125,17 +126,17 @@ class Run:
         return float(np.degrees(np.sqrt(np.trace(self.memory.covariance[:3, :3]))))
 
     def error_deg(self, scene):
-        estimated = Rotation.from_matrix(np.array(mrp_to_dcm(self.solution.sigma_bn)))
+        estimated = Rotation.from_matrix(np.array(mrp_to_dcm(present(self.solution).sigma_bn)))
         return float(np.degrees((scene.attitude * estimated.inv()).magnitude()))
 
     def heading_error_deg(self, scene):
         """Angle of estimated to true Sun."""
-        sun_b = np.array(mrp_to_dcm(self.solution.sigma_bn)) @ SUN_N
+        sun_b = np.array(mrp_to_dcm(present(self.solution).sigma_bn)) @ SUN_N
         return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(sun_b, scene.sun_b)), sun_b @ scene.sun_b)))
 
     def nees(self, scene):
         """Attitude error squared, normalised by the filter's covariance: 3 in the mean of a consistent filter."""
-        estimated = Rotation.from_matrix(np.array(mrp_to_dcm(self.solution.sigma_bn)))
+        estimated = Rotation.from_matrix(np.array(mrp_to_dcm(present(self.solution).sigma_bn)))
         # of frames, b true relative to b estimated
         turn = -(scene.attitude * estimated.inv()).as_rotvec()
         return float(turn @ np.linalg.solve(self.memory.covariance[:3, :3], turn))

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import typed_call
+from css_common.vectors import vector_of
 from css_estimation.attitude import attitude_update
 from css_estimation.attitude.attitude_solution import USED_FIELD, USED_SUN
 from css_estimation.attitude.slow_errors import FIELD, FIELD_RATE, MAGNETOMETER
@@ -42,7 +43,15 @@ class Converged:
         memory = copy.deepcopy(run.memory)
         field_b, given = field
         return _measure(
-            p or run.p, run.state, memory, voltages, tuple(map(float, field_b)), given, True, self.references, NO_LIGHT
+            p or run.p,
+            run.state,
+            memory,
+            voltages,
+            vector_of(np.asarray(field_b)),
+            given,
+            True,
+            self.references,
+            NO_LIGHT,
         )
 
     def cell(self, i, q):

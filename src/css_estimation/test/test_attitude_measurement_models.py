@@ -8,7 +8,7 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.vectors import multiply
+from css_common.vectors import multiply, vector_of
 from css_estimation.attitude import attitude_options, flight_references
 from css_estimation.attitude.cell_voltages import cell_measurement
 from css_estimation.attitude.direction_measurement import normalised_innovation
@@ -49,7 +49,7 @@ def turned(axis, angle, v):
     """Components of `v` once the body has turned: what the true attitude makes of a predicted direction."""
     turn = [0.0, 0.0, 0.0]
     turn[axis] = angle
-    return multiply(rotation_vector_to_dcm(tuple(turn)), v)
+    return multiply(rotation_vector_to_dcm(vector_of(np.asarray(turn))), v)
 
 
 def gradient(function, v):
@@ -89,7 +89,7 @@ def test_a_field_that_errs_lastingly(rng):
     field_n, bias_b = (tuple((k * rng.normal(size=3)).tolist()) for k in (3e-5, 3e-6))
 
     def predicted(turn=(0.0, 0.0, 0.0), off_n=NONE, off_b=NONE):
-        turned = np.array(rotation_vector_to_dcm(tuple(turn))) @ np.array(dcm_bn)
+        turned = np.array(rotation_vector_to_dcm(vector_of(np.asarray(turn)))) @ np.array(dcm_bn)
         return tuple((turned @ (np.array(field_n) + off_n) + bias_b + off_b).tolist())
 
     def residual(**off):

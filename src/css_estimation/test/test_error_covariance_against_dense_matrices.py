@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
 from css_common.attitude import rotation_vector_to_dcm
+from css_common.vectors import mat3
 from css_estimation.sun.error_covariance import (
     CORRECTION,
     Block,
@@ -65,7 +66,7 @@ def test_propagation_is_the_solution_of_the_lyapunov_equation(rng):
 def test_noise_alone_is_van_loans_integral(dt):
     """Of a body at rest the discrete noise is exact: every block of it, from the walk of the bias alone too."""
     f = np.block([[np.zeros((3, 3)), -np.eye(3)], [np.zeros((3, 6))]])
-    identity = tuple(map(tuple, np.eye(3).tolist()))
+    identity = mat3(np.eye(3))
     for sv2, su2 in ((0.0, 1e-3), (1e-2, 0.0), (3e-3, 2e-3)):
         q = np.diag([sv2] * 3 + [su2] * 3)
         exponential = expm(dt * np.block([[-f, q], [np.zeros((6, 6)), f.T]]))
@@ -80,7 +81,7 @@ def test_an_error_of_the_bias_turns_the_attitude(rng):
     phi = np.eye(9)
     phi[:3, :3], phi[:3, 3:6] = turn, -dt * np.eye(3)
     expected = phi @ p @ phi.T
-    propagate(p, tuple(map(tuple, turn.tolist())), dt, 0.0, 0.0, True)
+    propagate(p, mat3(turn), dt, 0.0, 0.0, True)
     np.testing.assert_allclose(p, expected, rtol=1e-12, atol=1e-15)
 
 
@@ -88,7 +89,7 @@ def test_without_gyro_the_bias_turns_nothing(rng):
     p = random_covariance(rng, 9)
     before = p.copy()
     turn = np.array(rotation_vector_to_dcm((0.1, 0.2, -0.1)))
-    propagate(p, tuple(map(tuple, turn)), 2.0, 1e-3, 1e-8, False)
+    propagate(p, mat3(np.array(turn)), 2.0, 1e-3, 1e-8, False)
     np.testing.assert_allclose(p[:3, :3], turn @ before[:3, :3] @ turn.T + 2e-3 * np.eye(3), atol=1e-15)
     np.testing.assert_allclose(p[:3, 3:], turn @ before[:3, 3:], atol=1e-15)
     np.testing.assert_allclose(p[3:, 3:], before[3:, 3:] + np.diag([2e-8] * 3 + [0.0] * 3), atol=1e-15)

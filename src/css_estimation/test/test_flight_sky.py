@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from okeefe_spacecraft import okeefe_values
+from presence import present
 
 from css_common.epochs import parse_utc
 from css_environment.earth_light import DISC, DISC_LIGHT
@@ -32,7 +33,7 @@ def stamp(given, elapsed_s):
 @pytest.mark.parametrize(("elapsed_s", "predicted"), [(NOON_S, PREDICTION_SUNLIT), (NIGHT_S, PREDICTION_ECLIPSED)])
 def test_sun_and_shadow_are_those_of_the_orbit(elapsed_s, predicted):
     given = values()
-    sky = flight_sky(given).at(stamp(given, elapsed_s))
+    sky = present(flight_sky(given)).at(stamp(given, elapsed_s))
     expected = MissionEnvironment(given, field=False).at(elapsed_s)
     assert sky.known and sky.predicted == predicted
     assert (sky.sun_n, sky.solar_flux, sky.illumination) == (
@@ -45,7 +46,10 @@ def test_sun_and_shadow_are_those_of_the_orbit(elapsed_s, predicted):
 def test_the_light_is_that_of_the_earth_which_the_filter_expects():
     bright, dark = values(albedo__factor=2.0), values(albedo__reflectivity="constant", albedo__constant=0.0)
     usual = values()
-    light = {name: flight_sky(v).at(stamp(v, NOON_S)).light for name, v in (("2", bright), ("0", dark), ("1", usual))}
+    light = {
+        name: present(flight_sky(v)).at(stamp(v, NOON_S)).light
+        for name, v in (("2", bright), ("0", dark), ("1", usual))
+    }
     assert light["1"][DISC + DISC_LIGHT] > 0.05
     # reflectivities above a half of which the double is cut to one lie at the poles, out of sight here
     assert light["2"][DISC + DISC_LIGHT] == pytest.approx(2.0 * light["1"][DISC + DISC_LIGHT], rel=0.02)
@@ -61,5 +65,5 @@ def test_who_asks_for_nothing_is_told_nothing():
 
 def test_an_estimator_that_knows_no_earth_may_ask_for_the_shadow_alone():
     given = values(Ekf, eclipse__source="both")
-    sky = flight_sky(given).at(stamp(given, NIGHT_S))
+    sky = present(flight_sky(given)).at(stamp(given, NIGHT_S))
     assert sky.predicted == PREDICTION_ECLIPSED and not np.any(sky.light)

@@ -12,7 +12,7 @@ from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.kernel import outer_kernel
-from css_common.vectors import angle_between
+from css_common.vectors import angle_between, vector_of
 from css_estimation.sun import least_squares as wls
 from css_estimation.sun import sun_patterns
 from css_estimation.sun.cell_layout import brightest
@@ -41,7 +41,7 @@ def heading(p, voltages):
 
 
 def degrees(a, b):
-    return math.degrees(angle_between(tuple(map(float, a)), tuple(map(float, b))))
+    return math.degrees(angle_between(vector_of(np.asarray(a)), vector_of(np.asarray(b))))
 
 
 @outer_kernel

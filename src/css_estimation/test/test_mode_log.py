@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lines about mode changes: each kind once, not more than one a minute, none forgotten."""
 
+from typing import Any
+
 import numpy as np
 from clark_light import NORMALS, PANEL, off_panel, outputs
 
@@ -32,9 +34,10 @@ def test_the_estimator_reports_that_the_pyramid_was_adopted():
         "cells.normals": NORMALS.ravel().tolist(),
         "cells.clip_normal": [0.0, 0.0, 0.0],
         "spacecraft.array_normal": PANEL.tolist(),
+        "mission.epoch": "2013-06-01T00:00:00Z",
     }
     component = PyramidSwitch("safe", shaped_values(table, checked_values(table, given)))
-    lines = []
+    lines: list[Any] = []
     component.report = lines.append
     for k, angle in enumerate((60.0, 40.0, 20.0, 0.0)):
         stamp_ns = component.epoch_ns + k * component.period_ns

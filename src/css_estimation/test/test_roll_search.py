@@ -111,7 +111,7 @@ def test_two_rolls_that_fit_alike_are_no_verdict():
     assert np.dot(field, SUN_N) > 0.1
     # a cell across it: its mirror image fits as well
     across = np.cross(search.along_b, [0.0, 0.0, 1.0])
-    normals = [across / np.linalg.norm(across)] * 2
+    normals = np.array([across / np.linalg.norm(across)] * 2)
     seen = Search(4, normals=normals)
     if normals[0] @ seen.attitude.apply(SUN_N) < 0.2:
         normals = np.negative(normals)

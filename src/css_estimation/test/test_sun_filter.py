@@ -22,7 +22,7 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_VALID,
 )
 from css_estimation.sun_filter import sun_filter
-from css_estimation.sun_filter.cell_update import rising
+from css_estimation.sun_filter.cell_model import rising
 from css_estimation.sun_filter.response import respond
 
 SIX = LAYOUTS["six faces"]
@@ -71,14 +71,13 @@ def test_the_sun_is_found_from_anywhere_that_three_cells_see(layout):
 
 
 @pytest.mark.parametrize("layout", ["dual pyramid", "six faces", "Clark's fourteen"])
-def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_error_bar(layout):
+def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_error_bar(layout, monkeypatch):
     errors = []
     for known in (True, False):
         flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.005, earth=(0.3, 0.9, 0.2), **LAYOUTS[layout])
         if not known:
             flight.sky = flight.sky._replace(known=False)
-            voltages = flight.voltages
-            flight.voltages = partial(_with_earth, flight, voltages)
+            monkeypatch.setattr(flight, "voltages", partial(_with_earth, flight, flight.voltages))
         heading = flight.fly(400.0, gyro=True)
         errors.append(flight.error_deg(heading))
     assert heading.mode == sun_filter.MODE_NO_EARTH
@@ -208,6 +207,22 @@ def test_another_intensity_is_learnt():
     heading = flight.fly(200.0, change=aged)
     assert heading.validity == VALIDITY_VALID
     assert flight.error_deg(heading) < 0.3
+
+
+@pytest.mark.parametrize("broken", [-1.0, np.nan, np.inf])
+def test_a_covariance_that_is_none_ends_the_estimate_and_not_the_filter(broken):
+    flight = SunFilterFlight(unit((0.2, 0.3, 0.93)), TURNING, white=0.005, earth=(0.3, 0.9, 0.2))
+    flight.fly(60.0)
+    states = flight.memory.covariances.shape[1]
+    flight.memory.covariances[:] = np.where(np.eye(states) > 0.0, broken, 0.0)
+    for _ in range(20):
+        heading = flight.step()
+        assert np.isfinite([*heading.sun_b, *heading.covariance, *heading.omega_bn_b]).all()
+        assert np.linalg.norm(heading.sun_b) == pytest.approx(1.0)
+        assert sum(heading.covariance[::4]) > 0.0
+    heading = flight.fly(60.0)
+    assert heading.validity == VALIDITY_VALID
+    assert flight.error_deg(heading) < 2.0
 
 
 def test_a_silence_is_not_bridged():

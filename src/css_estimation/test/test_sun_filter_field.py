@@ -39,7 +39,7 @@ def test_a_field_takes_away_the_error_across_itself_and_leaves_that_along():
     along = np.array(unit(FIELD_N))
     error = np.array([0.02, -0.01, 0.03])
     memory, field_b = turned(error, 0.1)
-    read = read_field(P, field_b, FIELD_N, STATES, memory.estimates[0], memory.covariances[0], memory)
+    read = read_field(P, field_b, FIELD_N, False, STATES, memory.estimates[0], memory.covariances[0], memory)
     left = attitude_error(memory)
     assert read.used == 2 and not read.refused
     assert np.dot(left, along) == pytest.approx(np.dot(error, along), rel=0.02)
@@ -54,7 +54,7 @@ def test_a_lasting_error_is_not_averaged_away():
     memory, field_b = turned((0.0, 0.0, 0.0), 0.1)
     biased = tuple(np.array(field_b) + np.array([3e-7, 0.0, 0.0]))
     for _ in range(500):
-        read_field(P, biased, FIELD_N, STATES, memory.estimates[0], memory.covariances[0], memory)
+        read_field(P, biased, FIELD_N, False, STATES, memory.estimates[0], memory.covariances[0], memory)
     lasting = P.field.lasting / np.dot(FIELD_N, FIELD_N)
     smallest = np.linalg.eigvalsh(memory.covariances[0][THETA : THETA + 3, THETA : THETA + 3])[0]
     assert 0.4 * lasting < smallest < lasting
@@ -65,7 +65,7 @@ def test_a_field_far_from_the_expected_one_is_refused():
     memory, field_b = turned((0.0, 0.0, 0.0), 0.01)
     before = memory.covariances[0].copy()
     turned_b = multiply(rotation_vector_to_dcm((0.5, 0.4, -0.3)), field_b)
-    read = read_field(P, turned_b, FIELD_N, STATES, memory.estimates[0], memory.covariances[0], memory)
+    read = read_field(P, turned_b, FIELD_N, False, STATES, memory.estimates[0], memory.covariances[0], memory)
     assert read.refused and read.likelihood < -5.0
     assert read.used < 2 or np.array_equal(memory.covariances[0], before)
 

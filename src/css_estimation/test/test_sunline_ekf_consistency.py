@@ -15,7 +15,7 @@ from okeefe_spacecraft import okeefe_values
 from scipy.stats import chi2
 
 from css_common.attitude import rotation_vector_to_dcm
-from css_common.vectors import angle_between, multiply, scale
+from css_common.vectors import angle_between, multiply, scale, vector_of
 from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sun_heading import UNAIDED
 from css_sensors.cells import CELLS
@@ -50,8 +50,8 @@ def fly_ideal(seed):
     """Errors on the tangent axes normalised (NEES), NIS and its degrees of freedom of each step."""
     rng = np.random.default_rng(seed)
     p, state = ekf(cell_sigma=CELL_SIGMA, process_sigma=PROCESS_SIGMA, gate=1.0)
-    sun_b = rng.normal(size=3)
-    sun_b = tuple((sun_b / np.linalg.norm(sun_b)).tolist())
+    drawn = rng.normal(size=3)
+    sun_b = vector_of(drawn / np.linalg.norm(drawn))
     start_b = turned(sun_b, tuple(0.05 * rng.normal(size=3)), 1.0)
     state = state._replace(
         started=True,
@@ -165,8 +165,8 @@ def test_without_gyro_it_converges_once_more_cells_see_the_sun():
 def test_finds_the_sun_from_a_wrong_start(seed):
     """A state on the other side of the sky is left within seconds of motion."""
     rng = np.random.default_rng(seed)
-    sun_b = rng.normal(size=3)
-    sun_b = tuple((sun_b / np.linalg.norm(sun_b)).tolist())
+    drawn = rng.normal(size=3)
+    sun_b = vector_of(drawn / np.linalg.norm(drawn))
     axis = np.cross(sun_b, rng.normal(size=3))  # a turn about the Sun line itself would show nothing new
     omega = tuple((math.radians(2.0) * axis / np.linalg.norm(axis)).tolist())
     p, state = ekf()

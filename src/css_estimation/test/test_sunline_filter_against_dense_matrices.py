@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
+from css_common.vectors import mat3
 from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.symmetric import congruence, product, row_major
@@ -142,8 +143,7 @@ def test_covariance_stays_positive_through_any_run_of_cells(directions):
 
 def test_symmetric_helpers(rng):
     m, p = Rotation.random(rng=rng).as_matrix(), random_covariance(rng)
-    rows = tuple(tuple(r) for r in m.tolist())
-    np.testing.assert_allclose(dense(congruence(rows, upper(p))), m @ p @ m.T, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(dense(congruence(mat3(m), upper(p))), m @ p @ m.T, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(product(upper(p), (1.0, 2.0, 3.0)), p @ (1.0, 2.0, 3.0), rtol=1e-13)
 
 

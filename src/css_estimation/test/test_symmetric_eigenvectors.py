@@ -21,9 +21,9 @@ def test_matrix_is_rebuilt_and_vectors_are_orthonormal(factor, rank, size):
     m = size * (factor.T @ factor)
     values, vectors = eigen((m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]))
     largest = max(np.abs(m).max(), 1e-300)
-    vectors = np.array(vectors)
-    np.testing.assert_allclose(vectors @ vectors.T, np.eye(3), atol=1e-14)
-    np.testing.assert_allclose(vectors.T @ np.diag(values) @ vectors / largest, m / largest, atol=1e-14)
+    axes = np.array(vectors)
+    np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(axes.T @ np.diag(values) @ axes / largest, m / largest, atol=1e-14)
     np.testing.assert_allclose(np.array(values) / largest, np.linalg.eigvalsh(m)[::-1] / largest, atol=1e-14)
 
 

@@ -94,7 +94,7 @@ def cells(normals):
 
 def find_sun(normals, sun_b, field_b, sigma=0.01):
     outputs = np.maximum(normals @ sun_b, 0.0)
-    mask = sum(1 << i for i in np.flatnonzero(outputs > 0.1))
+    mask = sum(1 << i for i in np.flatnonzero(outputs > 0.1).tolist())
     table = cells(normals)
     sun = lit_sun(table, outputs, mask, int(np.argmax(outputs)))
     return chosen_sun(table, outputs, mask, sun, float(sun_b @ field_b), tup(field_b), sigma, 0.1)

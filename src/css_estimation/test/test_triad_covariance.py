@@ -77,12 +77,15 @@ def test_unequal_errors_against_many_draws(sun_first):
 def test_the_order_that_leaves_less_is_taken_when_either_may_be_first():
     sun_n, field_n = (1.0, 0.0, 0.0), (0.0, 4e-5, 2e-5)
     fine, coarse = isotropic(1e-8), isotropic(1e-3)
-    field_variance = (1e-3 * np.linalg.norm(field_n)) ** 2
-    args = (field_n, field_variance, sun_n, field_n)
-    assert sun_field_attitude(sun_n, fine, *args, ORDER_BEST).mode == MODE_SUN_FIRST
-    assert sun_field_attitude(sun_n, coarse, *args, ORDER_BEST).mode == MODE_FIELD_FIRST
-    assert sun_field_attitude(sun_n, coarse, *args, ORDER_SUN).mode == MODE_SUN_FIRST
-    assert sun_field_attitude(sun_n, fine, *args, ORDER_FIELD).mode == MODE_FIELD_FIRST
+    field_variance = float((1e-3 * np.linalg.norm(field_n)) ** 2)
+
+    def solved(sun_covariance, order):
+        return sun_field_attitude(sun_n, sun_covariance, field_n, field_variance, sun_n, field_n, order)
+
+    assert solved(fine, ORDER_BEST).mode == MODE_SUN_FIRST
+    assert solved(coarse, ORDER_BEST).mode == MODE_FIELD_FIRST
+    assert solved(coarse, ORDER_SUN).mode == MODE_SUN_FIRST
+    assert solved(fine, ORDER_FIELD).mode == MODE_FIELD_FIRST
 
 
 def test_a_field_along_the_sun_or_none_gives_no_attitude():
@@ -96,7 +99,7 @@ def test_a_field_along_the_sun_or_none_gives_no_attitude():
 @given(st.floats(0.0, 1.0), st.floats(0.0, 6.3), st.floats(0.01, 0.5))
 def test_the_interpolated_field_of_a_turning_body_is_as_wrong_as_it_says(u, phase, turn):
     samples = [(math.cos(phase + k * turn), -math.sin(phase + k * turn), 0.3) for k in range(-1, 3)]
-    x, y, z = interpolated_field(*samples, u)
+    x, y, z = interpolated_field(samples[0], samples[1], samples[2], samples[3], u)
     off = math.hypot(x - math.cos(phase + u * turn), y + math.sin(phase + u * turn))
     assert z == pytest.approx(0.3)
     bound = math.sqrt(2.0 * interpolated_variance(0.0, 1.0, turn, u))

@@ -2,6 +2,7 @@
 """The two unscented Sun filters: closed forms, a turning body, darkness, and whether they are as good as they say."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ from css_sensors.cells import CELLS
 BOTH = pytest.mark.parametrize("algorithm", [sunline_ukf, sunline_suekf], ids=["sunline_ukf", "sunline_suekf"])
 DT = 0.1
 CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) / math.sqrt(3.0)
-IDEAL = {
+IDEAL: dict[str, Any] = {
     "cells__normals": CORNERS.ravel().tolist(),
     "cells__clip_normal": [0.0, 0.0, 0.0],
     "cells__field_of_view_deg": 180.0,
@@ -255,7 +256,7 @@ def fly_consistent(algorithm, seed):
     neither model.
     """
     rng = np.random.default_rng(seed)
-    sigma = IDEAL["cell_sigma"]
+    sigma = float(IDEAL["cell_sigma"])
     filter = Filter(algorithm, process_sigma=1e-4, rate_process_sigma=RATE_WALK, initial_rate_sigma=0.02)
     draw = rng.normal(size=3)
     sun_b = tuple((draw / np.linalg.norm(draw)).tolist())

@@ -16,7 +16,7 @@ def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
 
     Args:
         p, state, memory, dt, voltages: as of `css_estimation.attitude.attitude_ekf.step`.
-        aiding: `Aiding`, with the field if it was measured in this cycle.
+        aiding: `Aiding`, with the field if it was measured in this cycle; an algorithm with `AIDED_BY_SKY` has no more.
         around: `Surroundings`, with what the filter's own models say.
         k: row of the cycle in them.
     """
@@ -52,6 +52,8 @@ def _attitude_step(home):
     if home is None:
         return lambda p, state, memory, dt, voltages, aiding, around, k: (None, None)
     step = home.step
+    if getattr(home, "AIDED_BY_SKY", False):
+        return lambda p, state, memory, dt, voltages, aiding, around, k: step(p, state, memory, dt, voltages, aiding)
 
     def call(p, state, memory, dt, voltages, aiding, around, k):
         light = around.predicted_light[min(k, around.predicted_light.shape[0] - 1)]

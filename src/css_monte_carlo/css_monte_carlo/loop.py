@@ -42,7 +42,9 @@ class Vehicle(NamedTuple):
     clouds: Clouds
     heading_hears_field: bool
     control_hears_field: bool
+    attitude_hears_field: bool
     heading_hears_wheels: bool
+    attitude_hears_wheels: bool
     heading: Any  # parameters of the Sun estimator, or None
     attitude: Any  # parameters of the attitude filter, or None
     control: Any  # parameters of the control law, or None
@@ -154,7 +156,11 @@ def fly_block(
             )
             # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
             filtered_s = since_s if step > 0 else 0.0
-            aiding = Aiding(read.gyro_b, read.gyro_valid, read.field_b, read.field_valid, speeds, False, sky)
+            sky = sky_at(around.attitude_sky, around.attitude_sky_light, k)
+            field_is_new = v.attitude_hears_field and read.field_valid
+            aiding = Aiding(
+                read.gyro_b, read.gyro_valid, read.field_b, field_is_new, speeds, v.attitude_hears_wheels, sky
+            )
             attitude_state, attitude = estimate_attitude(
                 v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
             )

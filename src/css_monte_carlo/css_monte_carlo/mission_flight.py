@@ -19,6 +19,7 @@ from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
 from css_estimation.nodes.attitude_filter import AttitudeFilter
+from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
@@ -95,10 +96,14 @@ class MissionFlight:
         values = mission.values.mission
         self.own_surroundings = orbit_dispersion.is_dispersed(self._plant.values) or values.epoch_spread_days > 0.0
         self._measured = estimator
+        # an attitude filter is aided by references of its own, or as a Sun estimator is
+        aided = self._filter is not None and getattr(_algorithm(self._filter), "AIDED_BY_SKY", False)
+        self._aided = _values(self._filter) if aided else None
         self.surroundings = SurroundingsTables(
             self._plant.values,
             _values(self._heading),
-            _values(self._filter),
+            None if aided else _values(self._filter),
+            self._aided,
             common,
             self._own_earth,
             self._feels_field(),
@@ -220,7 +225,8 @@ class MissionFlight:
         has_field = self._magnetometer is not None
         control_hears = has_field and control is not None and plant.rods.fitted
         heading_hears = has_field and heading is not None and hears_field(heading)
-        is_heard = control_hears or heading_hears or (has_field and attitude is not None)
+        attitude_hears = has_field and attitude is not None and (self._aided is None or hears_field(self._aided))
+        is_heard = control_hears or heading_hears or attitude_hears
         x, y, z = (float(c) for c in plant.spacecraft.array_normal)
         return Vehicle(
             period_ns=self.mission.period_ns,
@@ -230,7 +236,9 @@ class MissionFlight:
             clouds=earth_reflectivity.clouds(self._array.values, self._grid),
             heading_hears_field=heading_hears,
             control_hears_field=control_hears,
+            attitude_hears_field=attitude_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),
+            attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
             heading=_parameters(self._heading, heading),
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
@@ -300,7 +308,7 @@ def _values(node: Node | None) -> Values | None:
 def _algorithm(node: Node) -> Any:
     """The module of the node of an estimator or a control law."""
     component = node.component
-    assert issubclass(component, (SunEstimator, AttitudeFilter, Controller))
+    assert issubclass(component, (SunEstimator, AttitudeFilter, Earthlight, Controller))
     return component.algorithm
 
 

@@ -6,6 +6,7 @@ from typing import NamedTuple
 from css_common.component import Component
 from css_common.mission import Mission, MissionError, Node
 from css_estimation.nodes.attitude_filter import AttitudeFilter
+from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_msgs.msg import AttitudeEstimate, SunEstimate
 from css_sim.nodes.css_array import CssArray
@@ -14,7 +15,7 @@ from css_sim.nodes.gyro import Gyro
 from css_sim.nodes.magnetometer import Magnetometer
 from sunpoint_control.controller import Controller
 
-_PLACES = (Dynamics, CssArray, Controller, Gyro, Magnetometer, SunEstimator, AttitudeFilter)
+_PLACES = (Dynamics, CssArray, Controller, Gyro, Magnetometer, SunEstimator, AttitudeFilter, Earthlight)
 
 
 class NoPlace(MissionError):

@@ -55,6 +55,8 @@ class Surroundings(NamedTuple):
     states: np.ndarray  # (K,) of STATE
     sky: np.ndarray  # (K,) of `sky_table.SKY`, what the Sun estimator's own models say; (1,) when it has none
     sky_light: np.ndarray  # (K, 192) light of the Earth by them; (1, 192) when it predicts none
+    attitude_sky: np.ndarray  # (K,) of SKY, what an attitude filter that is aided so says; (1,) without one
+    attitude_sky_light: np.ndarray  # (K, 192) light of the Earth by it; (1, 192) when it predicts none
     references: np.ndarray  # (K,) of REFERENCE, what the attitude filter's models say; (0,) without one
     predicted_light: np.ndarray  # (K, 192) patches of light by them; (1, 192) when no filter takes albedo off
     light: np.ndarray  # (K, 192) patches of light of the Earth; (1, 192) when each case has its own Earth, or none
@@ -135,6 +137,7 @@ class SurroundingsTables:
         plant: values of the node that owns the truth (its orbit, shadow and field).
         heading: values of the Sun estimator that flies (its own models); None: none flies.
         attitude: values of the attitude filter that flies (its own models); None: none flies.
+        aided: values of an attitude filter that is aided as Sun estimators are, in the place of `attitude`.
         reflectivity: (rows, columns) of the Earth that all cases share; None without albedo.
         own_earth: each case has its own reflectivities, on a grid of that shape.
         field: something feels the geomagnetic field.
@@ -147,6 +150,7 @@ class SurroundingsTables:
         plant: Values,
         heading: Values | None,
         attitude: Values | None,
+        aided: Values | None,
         reflectivity: np.ndarray | None,
         own_earth: bool = False,
         field: bool = True,
@@ -155,6 +159,7 @@ class SurroundingsTables:
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field, orbit)
         self._sky: FlightSky | None = None if heading is None else flight_sky(heading)
+        self._attitude_sky: FlightSky | None = None if aided is None else flight_sky(aided)
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
@@ -203,7 +208,8 @@ class SurroundingsTables:
         elif grid is not None and has_light:
             _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
         stamps_ns = [self._epoch_ns + (first + k) * self._period_ns for k in range(count)]
-        return Surroundings(states, *sky_table(self._sky, stamps_ns), *self._modelled(first, count), light, views)
+        skies = (*sky_table(self._sky, stamps_ns), *sky_table(self._attitude_sky, stamps_ns))
+        return Surroundings(states, *skies, *self._modelled(first, count), light, views)
 
     def _modelled(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """What the attitude filter's models say, and the light that they predict."""

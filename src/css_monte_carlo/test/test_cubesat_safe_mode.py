@@ -3,6 +3,7 @@
 
 import itertools
 import json
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -94,7 +95,7 @@ def study_of(share, detumbled, late):
         | {"detumbled_s": pa.array(detumbled, pa.float64()), "power_positive_late": pa.array(late, pa.float64())}
     )
     mission = mission_from_text(text, "made up")
-    return Study(None, {"mission_text": mission.text(), "configurations": [labels]}, table, None)
+    return Study(Path(), {"mission_text": mission.text(), "configurations": [labels]}, table, None)
 
 
 def test_limits_are_included_and_no_value_meets_nothing():

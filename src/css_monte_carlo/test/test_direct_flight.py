@@ -7,6 +7,7 @@ case through the eclipse. `./sunpoint reproduce okeefe` flies all of them.
 
 import numpy as np
 import pytest
+from presence import present
 from synthetic_flight import record
 
 from css_analysis.estimator_runs import estimator_runs
@@ -78,9 +79,9 @@ def test_without_gyro_the_rate_comes_from_the_sun():
 
 def test_a_flight_is_repeatable_and_a_case_is_not_another():
     first, again, other = (fly_directly(configured(short(), case=case)) for case in (1, 1, 2))
-    np.testing.assert_array_equal(first.truth.sigma_bn, again.truth.sigma_bn)
+    np.testing.assert_array_equal(present(first.truth).sigma_bn, present(again.truth).sigma_bn)
     np.testing.assert_array_equal(first.estimates["ekf"].covariance, again.estimates["ekf"].covariance)
-    assert not np.array_equal(first.truth.sigma_bn, other.truth.sigma_bn)
+    assert not np.array_equal(present(first.truth).sigma_bn, present(other.truth).sigma_bn)
 
 
 def test_estimators_beside_the_flown_one_do_not_change_the_flight():
@@ -88,7 +89,7 @@ def test_estimators_beside_the_flown_one_do_not_change_the_flight():
     both = fly_directly(short(f"graph.nodes={','.join(nodes)}"))
     alone = fly_directly(short())
     assert set(both.estimates) == {"ekf", "wavg"} and both.flown == "ekf"
-    np.testing.assert_array_equal(both.truth.sigma_bn, alone.truth.sigma_bn)
+    np.testing.assert_array_equal(present(both.truth).sigma_bn, present(alone.truth).sigma_bn)
     assert [run["flown"] for run in estimator_runs(both)] == [True, False]
 
 
@@ -113,7 +114,7 @@ def test_a_mission_without_control_tumbles_on():
     log = fly_directly(short(f"graph.nodes={','.join(nodes)}"))
     assert log.control is None and log.flown is None
     body = load_mission("okeefe_2013").values.spacecraft.inertia
-    momentum = np.linalg.norm(log.truth.omega_bn_b @ body, axis=1)
+    momentum = np.linalg.norm(present(log.truth).omega_bn_b @ body, axis=1)
     assert np.ptp(momentum) < 0.01 * momentum[0]
 
 
@@ -138,11 +139,11 @@ def test_scripted_changes_come_when_they_are_due():
 def test_the_log_equals_the_one_of_a_recording(tmp_path):
     log = fly_directly(short())
     topics = {"/truth": log.truth, "/ekf/sun_estimate": log.estimates["ekf"], "/control/status": log.control}
-    kinds = {f"/{topic}": kind for topic, kind in log.mission.topics.items()}
+    kinds = {f"/{topic}": kind for topic, kind in present(log.mission).topics.items()}
     folder = record(
         tmp_path / "flight",
-        {topic: (kinds[topic], columns) for topic, columns in topics.items()},
-        log.mission.text(),
+        {topic: (kinds[topic], present(columns)) for topic, columns in topics.items()},
+        present(log.mission).text(),
     )
     again = read_flight(folder)
     assert estimator_runs(again) == estimator_runs(log)

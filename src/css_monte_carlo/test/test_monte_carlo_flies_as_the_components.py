@@ -129,6 +129,12 @@ def test_every_estimator_is_the_same(estimator, gyro):
     assert same_steps(mission.with_overrides(["mission.duration=20.0"])) == 200
 
 
+@pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
+def test_a_calibration_of_cells_is_the_same_as_far_as_into_its_manoeuvre(gyro):
+    mission = configured(load_mission("okeefe_calibration"), gyro=gyro)
+    assert same_steps(mission.with_overrides(["mission.duration=360.0"])) == 3600
+
+
 RODS_ALONE = {
     "detumbling": (),
     "in the shadow": ("orbit.true_anomaly_deg=180.0",),

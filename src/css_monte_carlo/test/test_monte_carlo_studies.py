@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 import pytest
@@ -173,7 +174,7 @@ def test_threads_give_the_results_of_one_flight_each(whole):
 
 def test_cluster_with_a_worker_that_is_killed_gives_the_same_bytes(whole, tmp_path, monkeypatch):
     monkeypatch.setattr(study, "CHUNK_CASES", 1)
-    killed = []
+    killed: list[Any] = []
 
     def kill_one(done: int, total: int) -> None:
         if done >= 2 and not killed:

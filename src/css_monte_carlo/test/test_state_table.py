@@ -16,7 +16,7 @@ from css_monte_carlo.state_table import StateTable, keep_state, state_of
 class Inner(NamedTuple):
     """Numbers of several kinds."""
 
-    count: int
+    counted: int
     known: bool
     seed: np.uint32
     share: np.float32
@@ -43,10 +43,10 @@ def advance(rows, like, out):
         s = state_of(rows, c, like)
         i = s.inner
         out[c, 0], out[c, 1], out[c, 2] = s.vector
-        out[c, 3], out[c, 4], out[c, 5], out[c, 6] = i.count + 2**62, i.known, i.seed, i.share
+        out[c, 3], out[c, 4], out[c, 5], out[c, 6] = i.counted + 2**62, i.known, i.seed, i.share
         out[c, 7] = s.memory[0]
         s.memory[1] += 1.0
-        after = Inner(i.count + 1, not i.known, i.seed, i.share)
+        after = Inner(i.counted + 1, not i.known, i.seed, i.share)
         keep_state(rows, c, like, State((s.vector[1], s.vector[2], s.vector[0]), after, s.nothing, s.memory))
 
 

@@ -40,3 +40,9 @@ def _rows(table: pa.Table, configuration: Configuration) -> pa.Table:
         pc.equal(table.column("overrides"), " ".join(configuration.overrides)),
     )
     return table.filter(same)
+
+
+def mean_of(values: np.ndarray) -> float | None:
+    """Mean over the cases that have a number; None when none has."""
+    known = values[np.isfinite(values)]
+    return float(np.mean(known)) if len(known) else None

@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 import pytest
+from presence import present
 
 from css_estimation.sun import least_squares, sunline_suekf, wavg
 from css_estimation.sun.cell_layout import cell_layout
@@ -49,7 +50,7 @@ class Scene:
         for sun, row in zip(SKY, self.outputs > 0.0, strict=True):
             n = self.normals[row]
             inside = n.T @ np.linalg.lstsq(n.T, sun, rcond=None)[0]
-            angles.append(math.degrees(math.acos(min(1.0, np.linalg.norm(inside)))))
+            angles.append(math.degrees(math.acos(min(1.0, float(np.linalg.norm(inside))))))
         return np.array(angles)
 
 
@@ -118,18 +119,18 @@ def sigma_deg(covariance):
 def test_least_norm_is_off_by_the_angle_of_the_sun_to_the_span_of_the_lit_cells(layout):
     scene = Scene(KINDS["wls"], layout)
     found = headings.headings(KINDS["wls"], layout, SKY, cycles=1)
-    chosen = (scene.rank < 3) & found.valid
-    np.testing.assert_allclose(found.error_deg[chosen], scene.off_the_span_deg()[chosen], atol=1e-5)
+    chosen = (scene.rank < 3) & present(found).valid
+    np.testing.assert_allclose(present(found).error_deg[chosen], scene.off_the_span_deg()[chosen], atol=1e-5)
 
 
 @pytest.mark.parametrize("name", [name for name in KINDS if (name, "six faces") in PAIRS])
 def test_noise_of_the_cells_is_noise_of_the_heading(name):
     """Two components across the Sun with an error of 0.02 each are off by 1.4 deg on average."""
     kind = KINDS[name]
-    found = over_the_sky(headings.headings(kind, "six faces", SKY, noise=NOISE, cycles=CYCLES))
-    quiet = over_the_sky(headings.headings(kind, "six faces", SKY, cycles=CYCLES))
+    found = over_the_sky(present(headings.headings(kind, "six faces", SKY, noise=NOISE, cycles=CYCLES)))
+    quiet = over_the_sky(present(headings.headings(kind, "six faces", SKY, cycles=CYCLES)))
     across_deg = math.degrees(NOISE * math.sqrt(math.pi / 2.0))
-    assert found.mean_deg < quiet.mean_deg + 1.2 * across_deg
+    assert present(found.mean_deg) < present(quiet.mean_deg) + 1.2 * across_deg
     assert found.not_valid == 0.0
 
 
@@ -140,8 +141,8 @@ SUN_B = np.array([0.300, 0.316, 0.900]) / math.sqrt(0.3**2 + 0.316**2 + 0.9**2)
 def test_dim_cells_of_six_faces_count(name):
     """Two cells read a third of the brightest: a gate for views of 120 deg has them for Earth, and errs by 25.8 deg."""
     found = headings.headings(KINDS[name], "six faces", SUN_B[None, :], cycles=CYCLES)
-    bar = 3.0 * sigma_deg(found.covariance)[0] if KINDS[name].algorithm in WITH_LIGHT else CONVERGED_DEG
-    assert found.valid[0] and found.error_deg[0] < bar
+    bar = 3.0 * sigma_deg(present(found).covariance)[0] if KINDS[name].algorithm in WITH_LIGHT else CONVERGED_DEG
+    assert present(found).valid[0] and present(found).error_deg[0] < bar
 
 
 @pytest.mark.parametrize("name", ["wavg", "wls"])

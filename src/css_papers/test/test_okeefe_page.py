@@ -2,10 +2,12 @@
 """The page of O'Keefe & Schaub 2013 from tables of which every number is known, and from a few real flights."""
 
 import json
+from typing import Any
 
 import numpy as np
 import pytest
 from matplotlib import image
+from noting import noted
 from synthetic_study import case_table, percentile_table
 
 from css_analysis.flight_metrics import Windows
@@ -53,8 +55,8 @@ def test_figures_of_merit_of_one_configuration_among_several():
     assert m.cases == 3 and m.converged_percent == 100.0
     assert m.heading_error_late_deg == pytest.approx(5.0)
     assert m.rate_50min_deg_s == pytest.approx(0.01) and m.rate_knowledge_50min_deg_s == pytest.approx(0.002)
-    assert (m.converging_mean_min, m.converging_max_min) == (pytest.approx(1.0), pytest.approx(1.5))
-    assert (m.converging_first_max_min, m.converging_later_max_min) == (pytest.approx(1.0), pytest.approx(1.0))
+    assert (m.converging_mean_min, m.converging_max_min) == pytest.approx((1.0, 1.5))
+    assert (m.converging_first_max_min, m.converging_later_max_min) == pytest.approx((1.0, 1.0))
     assert m.acquired_mean_min == pytest.approx(2.0)
 
 
@@ -107,8 +109,11 @@ def made_up(mission, configurations, cases, folder, **_):
 
 def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(paper, "run_study", made_up)
-    mapped, write = [], sensor_part.write_coverage_figures
-    monkeypatch.setattr(sensor_part, "write_coverage_figures", lambda *given: mapped.append(given) or write(*given))
+    mapped: list[Any] = []
+    write = sensor_part.write_coverage_figures
+    monkeypatch.setattr(
+        sensor_part, "write_coverage_figures", lambda *given: noted(mapped, given, lambda: write(*given))
+    )
     assert main(["okeefe", "--cases", "30", "--out", str(tmp_path / "new"), "--json"]) == 0
     folder = tmp_path / "new"
     out = capsys.readouterr().out
@@ -141,9 +146,9 @@ def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
 
 
 def test_a_quick_look_leaves_side_studies_out(tmp_path, monkeypatch):
-    flown = []
+    flown: list[Any] = []
     monkeypatch.setattr(
-        paper, "run_study", lambda m, c, n, f, **k: flown.append((f.name, n, len(c))) or made_up(m, c, n, f)
+        paper, "run_study", lambda m, c, n, f, **k: noted(flown, (f.name, n, len(c)), lambda: made_up(m, c, n, f))
     )
     monkeypatch.setattr(paper, "sensor_part", lambda mission, folder: Part([], []))
     assert main(["okeefe", "--quick", "--out", str(tmp_path)]) == 0

@@ -100,7 +100,7 @@ def test_variants_share_a_line_of_the_table():
 
 def test_both_forms_of_a_page_say_the_same(tmp_path):
     heading, lines = table_of(ROWS)
-    blocks = [
+    blocks: list[str | Table | Listing | Picture | Link] = [
         "A | bar & <angles>",
         Table(heading, lines),
         Listing(notes_of(ROWS)),

@@ -1,19 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads which columns of a telemetry table are sun sensor cells, and where the cells look.
-
-YAML:
-    cells:
-      CSS_1: [0.7071, 0.0, 0.7071]     # column name: outward normal in the body frame
-      CSS_2: [0.0, 0.7071, 0.7071]
-    field_of_view_deg: 120.0           # optional: full cone of view of a cell
-    clip_normal: [0.0, 0.0, 1.0]       # optional: body plane that hides the other half space from each cell
-    dark_level: 100.0                  # optional: what a cell gives in the dark, in the unit of the table
-    full_scale: {CSS_1: 2900, CSS_2: 3000}  # optional: what the Sun, met head-on, adds to that
-CSV: a header `cell,x,y,z` and a row for each cell.
-
-A name is what stands there: `on`, `1`, `01` and `+X` are four cells. `dark_level` and `full_scale` are one number for
-all cells, or one for each.
-"""
+"""Reads which columns of a telemetry table are sun sensor cells, and where the cells look (form: `table_forms`)."""
 
 import csv
 import math

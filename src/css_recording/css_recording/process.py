@@ -14,15 +14,6 @@ class RosArgumentsError(Exception):
     """What was given to ROS cannot be understood. The text is one line."""
 
 
-def split_arguments(arguments: Sequence[str]) -> tuple[list[str], list[str]]:
-    """A command's own arguments, and those for ROS, from `--ros-args` on.
-
-    `remove_ros_args` of rclpy is no help: it takes `OLD:=NEW` for its own wherever it stands.
-    """
-    at = arguments.index("--ros-args") if "--ros-args" in arguments else len(arguments)
-    return list(arguments[:at]), list(arguments[at:])
-
-
 @contextmanager
 def ros_process(name: str, for_ros: Sequence[str]) -> Iterator[None]:
     """ROS, while the context lasts.

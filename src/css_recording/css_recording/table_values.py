@@ -7,9 +7,7 @@ from datetime import date, timedelta
 from decimal import Decimal
 
 from css_common.epochs import parse_utc
-
-TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-"""Nanoseconds in the units that times can have."""
+from css_recording.table_forms import TIME_UNITS
 
 _UNIT_NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 

@@ -1,20 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a table of telemetry: time, cell outputs, body rate, Sun vector.
-
-The first line names the columns; a unit may stand behind a name in brackets. Separator: comma, semicolon, tabulator,
-bar or blanks; numbers may have decimal commas where commas do not separate. Lines that begin with # and empty lines
-are skipped. An empty field, `nan`, `na`, `null`, `none` or `-` is a missing value, and so is a usual fill value such
-as -9999 or 65535 that lies far outside of everything else.
-
-time, timestamp                seconds (or --time-unit), or ISO 8601 instants (UTC without an offset), also by day
-                               of year (2024-001T00:00:00)
-<names of the cell layout>     cell outputs
-omega_x_rad_s, omega_y_..      body rate about each axis; also gyro_x or rate_x, and deg_s or dps for degrees
-sun_x, sun_y, sun_z            direction from the spacecraft to the Sun in the body frame, of any length
-
-Lines must go forward in time: of those that do not fit together the largest set that does is good, the others are
-broken.
-"""
+"""Reads a table of telemetry: time, cell outputs, body rate, Sun vector (form: `table_forms`)."""
 
 import hashlib
 import math

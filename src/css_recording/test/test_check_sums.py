@@ -9,6 +9,7 @@ from io import BytesIO
 import pytest
 from mcap.data_stream import ReadDataStream
 from mcap.records import DataEnd, Footer
+from presence import present
 
 from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
@@ -45,7 +46,7 @@ def everything(path):
 def test_the_writer_fills_in_both_check_sums(bag):
     data = (bag / "bag_0.mcap").read_bytes()
     file = McapFile(bag / "bag_0.mcap")
-    end, footer_at, summary_at = file.ending.data_end, file.ending.footer_at, file.ending.footer.summary_start
+    end, footer_at, summary_at = file.ending.data_end, file.ending.footer_at, present(file.ending.footer).summary_start
     file.close()
     data_end = DataEnd.read(ReadDataStream(BytesIO(data[end + 9 :])))
     assert data_end.data_section_crc == zlib.crc32(data[:end])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from presence import present
 from rosbags.highlevel import AnyReader
 
 from css_common.mission_file import flattened, read_sections
@@ -92,7 +93,7 @@ def test_mission_inside_holds_the_layout_and_passes_the_checks_of_missions(tmp_p
     with BagReader(tmp_path / "bag") as reader:
         text = reader.mission_text
         assert reader.description["python"]
-    shared = flattened(read_sections(text, "recording")["/**"])
+    shared = flattened(read_sections(present(text), "recording")["/**"])
     values = checked_values(shared_parameters().values(), shared)
     assert values["cells.normals"] == [1.0, 0.0, 0.0, 0.0, 0.6, 0.8]
     assert values["cells.field_of_view_deg"] == 100.0

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import termios
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from rclpy.parameter import Parameter
@@ -60,7 +61,7 @@ class Hands:
 @pytest.fixture
 def heard(graph):
     """What is heard of the voltages and the torques, in one list."""
-    messages = []
+    messages: list[Any] = []
     node = graph.node("listener")
     for kind, topic in ((CssVoltages, "css/voltages"), (WheelTorqueCommand, "wheels/torque_command")):
         node.create_subscription(kind, topic, messages.append, RECORDER_SUBSCRIPTION, raw=True)
@@ -121,7 +122,7 @@ def test_the_rate_is_a_parameter(flight, tmp_path, graph, heard):
     with BagReader(folder) as reader:
         options = PlaybackOptions(rate=1e-6, topics=("css/voltages",))
         player = graph.add(PlayerNode(reader, options, **graph.options))
-        results = []
+        results: list[Any] = []
 
         def hurry():
             if len(heard) == 1 and not results:
@@ -153,7 +154,7 @@ def test_types_of_rosbag2_are_used_where_they_are_installed(flight, tmp_path, gr
     with BagReader(flight.record(tmp_path / "bag", 2)) as reader:
         player = graph.add(PlayerNode(reader, PlaybackOptions(), **graph.options))
         monkeypatch.setattr(player_controls, "_rosbag2_service", lambda name: name)
-        node = SimpleNamespace(
+        node: Any = SimpleNamespace(
             create_service=lambda kind, name, serve: made.update({name: (kind, serve)}),
             declare_parameter=lambda name, value, _: SimpleNamespace(value=value),
             add_on_set_parameters_callback=lambda _: None,
@@ -245,6 +246,7 @@ def test_command_refuses_in_one_line(flight, tmp_path, monkeypatch, capsys, argu
     flight.record(tmp_path / "bag", 11)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(command, "StopSignal", lambda: SimpleNamespace(came=True))
+    code: object
     try:
         code = command.main(["bag", *arguments])
     except SystemExit as exit_info:

@@ -5,8 +5,10 @@ import signal
 import subprocess
 import sys
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
+from presence import present
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import Imu
 
@@ -29,7 +31,7 @@ class Listener:
     """Keeps all that it hears on a topic."""
 
     def __init__(self, node, message_type, topic):
-        self.heard = []
+        self.heard: list[Any] = []
         node.create_subscription(message_type, topic, self.heard.append, RECORDER_SUBSCRIPTION, raw=True)
 
 
@@ -52,7 +54,7 @@ def test_what_is_played_are_the_bytes_that_were_recorded(flight, tmp_path, graph
 
 def test_the_rate_holds_back(flight, tmp_path, graph):
     # by a wall clock that advances a tenth of a second each time it is looked at
-    readings = []
+    readings: list[Any] = []
 
     def now():
         readings.append(0.1 * len(readings))
@@ -90,7 +92,8 @@ def estimator(graph, late_every=0):
     node = graph.node("estimator")
     codec = codec_of(SunEstimate)
     publisher = node.create_publisher(SunEstimate, "live/sun_estimate", LOOP_PUBLISHER)
-    seen, late = [], []
+    seen: list[Any] = []
+    late: list[Any] = []
 
     def answer():
         publisher.publish(codec.encode(codec.sample(seen[-1], "bus")))
@@ -176,7 +179,7 @@ def test_player_process_loops_until_told_to_end(flight, tmp_path, graph):
         assert process.wait(DEADLINE) == 0
     finally:
         process.kill()
-    assert "messages of" in process.stdout.read()
+    assert "messages of" in present(process.stdout).read()
     # wherever it was when the listener was found, from there on nothing is missing
     once = [data for _, _, data in voltages_of(flight, 10)]
     first = once.index(voltages.heard[0])

@@ -8,6 +8,7 @@ import sys
 from types import SimpleNamespace
 
 import pytest
+from presence import present
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -71,7 +72,7 @@ def test_the_plant_is_heard_last_so_that_it_waits_for_the_recorder(tmp_path, gra
 
     mission = load_mission("okeefe_2013")
     plant = graph.node("plant")
-    plant_topics = {output.topic for output in mission.plant.outputs}
+    plant_topics = {output.topic for output in present(mission.plant).outputs}
     of_the_plant = [
         plant.create_publisher(output.message_type, topic, LOOP_PUBLISHER)
         for topic, output in mission.outputs.items()

@@ -1,10 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings are what other readers take for one: `rosbags`, `mcap` with ROS 2 support, `pymcap-cli`."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
+from presence import present
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 
@@ -23,7 +26,7 @@ def recording(flight, tmp_path_factory):
 def test_rosbags_decodes_the_values_with_the_recorded_definitions(flight, recording):
     # AnyReader knows css_msgs only from the schema inside the file
     with AnyReader([recording]) as reader:
-        seen = [
+        seen: list[tuple[str, int, Any]] = [
             (connection.topic, stamp, reader.deserialize(data, connection.msgtype))
             for connection, stamp, data in reader.messages()
         ]
@@ -109,7 +112,7 @@ def test_topic_without_messages_and_topic_added_in_flight(flight, tmp_path, doct
             "/css/voltages": 30,
             "/extra": 0,
         }
-        assert reader.topics[1].topic.schema.type_name == "std_msgs/msg/Header"
+        assert present(reader.topics[1].topic.schema).type_name == "std_msgs/msg/Header"
     with Reader(writer.folder) as reader:
         assert {connection.topic: connection.msgcount for connection in reader.connections} == {
             "/css/voltages": 30,

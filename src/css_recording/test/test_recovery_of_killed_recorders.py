@@ -8,8 +8,10 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from typing import Any
 
 import pytest
+from presence import present
 from rosbags.highlevel import AnyReader
 
 from css_recording.bag_metadata import Topic
@@ -49,12 +51,12 @@ def test_sigkill_costs_at_most_the_open_second(flight, tmp_path, seed, doctor):
         [sys.executable, "-c", RECORDER, str(folder), data.hex()], stdout=subprocess.PIPE, text=True
     )
     delay = random.Random(seed).uniform(0.0, 0.1)
-    lines = [process.stdout.readline()]
+    lines = [present(process.stdout).readline()]
     deadline = time.monotonic() + delay
     while time.monotonic() < deadline:
-        lines.append(process.stdout.readline())
+        lines.append(present(process.stdout).readline())
     process.kill()
-    lines += process.stdout.readlines()
+    lines += present(process.stdout).readlines()
     process.wait()
     handed_over = int([line for line in lines if line.endswith("\n")][-1]) + 1
 
@@ -99,7 +101,7 @@ def test_no_truncation_crashes_recovery_or_makes_up_a_message(small, tmp_path):
     # run at both ends of each range of lengths that have the same ones.
     _, whole, messages = small
     torn = tmp_path / "torn.mcap"
-    ranges = []
+    ranges: list[Any] = []
     for length in range(8):
         torn.write_bytes(whole[:length])
         with pytest.raises(BagError, match=r"torn\.mcap"):

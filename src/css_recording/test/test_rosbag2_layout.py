@@ -13,6 +13,7 @@ import yaml
 from mcap.reader import NonSeekingReader, make_reader
 from mcap.records import Chunk, MessageIndex
 from mcap.stream_reader import StreamReader
+from presence import present
 from rosbags.rosbag2 import Reader
 
 from css_recording.bag_metadata import QosProfile, Topic, parse_qos, read_metadata
@@ -236,8 +237,8 @@ def test_two_topics_of_one_type_share_a_schema(flight, tmp_path):
         pass
     with writer.path.open("rb") as file:
         summary = make_reader(file).get_summary()
-    assert len(summary.schemas) == 1
-    assert sorted(channel.topic for channel in summary.channels.values()) == ["/a", "/b"]
+    assert len(present(summary).schemas) == 1
+    assert sorted(channel.topic for channel in present(summary).channels.values()) == ["/a", "/b"]
 
 
 @pytest.mark.parametrize("files", [None, FileLimits(), FileLimits(longest_ns=3 * 10**9)])
@@ -261,10 +262,10 @@ def test_times_of_a_recording_whose_last_and_first_messages_came_late(flight, tm
     for path in sorted(folder.glob("*.mcap")):
         with path.open("rb") as file:
             reader = make_reader(file)
-            statistics = reader.get_summary().statistics
+            statistics = present(reader.get_summary()).statistics
             stamps = [message.log_time for _, _, message in reader.iter_messages()]
-            chunks = reader.get_summary().chunk_indexes
-        spans.append((statistics.message_start_time, statistics.message_end_time))
+            chunks = present(reader.get_summary()).chunk_indexes
+        spans.append((present(statistics).message_start_time, present(statistics).message_end_time))
         assert spans[-1] == (min(stamps), max(stamps))
         assert min(c.message_start_time for c in chunks) == min(stamps)
         assert max(c.message_end_time for c in chunks) == max(stamps)

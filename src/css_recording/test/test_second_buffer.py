@@ -6,6 +6,7 @@ import random
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from presence import present
 
 from css_recording.second_buffer import SECOND_NS, BufferLimits, SecondBuffer
 
@@ -49,7 +50,7 @@ def test_each_span_is_one_batch_and_comes_out_when_it_is_over():
     buffer = SecondBuffer(LIMITS)
     for message in regular(10):
         assert not buffer.add(message)
-    (batch,) = buffer.add(regular(11)[-1])
+    (batch,) = present(buffer.add(regular(11)[-1]))
     assert batch == regular(8)
     assert len(buffer.held()) == 2 * 3 + 1
 

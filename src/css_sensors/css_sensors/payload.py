@@ -6,16 +6,26 @@ from collections.abc import Iterator
 import numpy as np
 
 from css_common.schema import Table, Values, real, reals
+from css_common.sections import LAUNCH_LATITUDE, LAUNCH_LONGITUDE
 
 AXIS_AZIMUTH = real(
     "payload.axis_azimuth_deg",
-    330.0,
+    None,
     "deg",
     "angular momentum at the epoch, from north over east",
     low=-360.0,
     high=360.0,
+    example="payload: {axis_azimuth_deg: 330.0}",
 )
-AXIS_ELEVATION = real("payload.axis_elevation_deg", 80.0, "deg", "its elevation", low=-90.0, high=90.0)
+AXIS_ELEVATION = real(
+    "payload.axis_elevation_deg",
+    None,
+    "deg",
+    "its elevation",
+    low=-90.0,
+    high=90.0,
+    example="payload: {axis_elevation_deg: 80.0}",
+)
 PHASE_STARTS = reals(
     "payload.phase_starts",
     (0.0,),
@@ -24,22 +34,32 @@ PHASE_STARTS = reals(
     low=0.0,
     high=1e5,
 )
-SPIN = reals("payload.spin_hz", (5.45,), "Hz", "turns a second relative to the Sun in each phase", low=0.01, high=50.0)
+SPIN = reals(
+    "payload.spin_hz",
+    (),
+    "Hz",
+    "turns a second relative to the Sun in each phase",
+    low=0.01,
+    high=50.0,
+    example="payload: {spin_hz: [5.45]}",
+)
 CONING_PERIOD = reals(
     "payload.coning_period",
-    (0.2618,),
+    (),
     "s",
     "turn of the spin axis about the angular momentum in each phase",
     low=0.01,
     high=1e3,
+    example="payload: {coning_period: [0.2618]}",
 )
 CONING_ANGLE = reals(
     "payload.coning_angle_deg",
-    (12.89,),
+    (),
     "deg",
     "full angle of the cone of the spin axis in each phase",
     low=0.0,
     high=120.0,
+    example="payload: {coning_angle_deg: [12.89]}",
 )
 FINAL_CONING_PERIOD = real(
     "payload.final_coning_period",
@@ -69,6 +89,12 @@ PAYLOAD: Table = (
 )
 
 
+def needed_of_payload(values: Values) -> tuple[str, ...]:
+    """What a component cannot do without that has to know how the payload turns, and over which place."""
+    needed = (LAUNCH_LATITUDE, LAUNCH_LONGITUDE, AXIS_AZIMUTH, AXIS_ELEVATION, SPIN, CONING_PERIOD, CONING_ANGLE)
+    return tuple(p.name for p in needed)
+
+
 def conflicts(payload: Values) -> Iterator[str]:
     """What is wrong between the values of the section, one message each."""
     starts = payload.phase_starts
@@ -77,6 +103,8 @@ def conflicts(payload: Values) -> Iterator[str]:
         return
     for key in ("spin_hz", "coning_period", "coning_angle_deg"):
         given = getattr(payload, key)
+        if not len(given):
+            return  # whoever needs it asks for it
         if len(given) != len(starts):
             yield f"payload.{key}: {len(given)} values given, expected {len(starts)}, one for each phase"
             return

@@ -19,16 +19,29 @@ def test_missions_have_the_sections():
     assert shared_sections().items() >= SECTIONS.items()
 
 
-PHASES = {"payload__phase_starts": [0.0, 50.0], "payload__spin_hz": [5.0, 2.0], "payload__coning_angle_deg": [9.0, 8.0]}
+ONE = {"payload__spin_hz": [5.45], "payload__coning_period": [0.2618], "payload__coning_angle_deg": [12.89]}
+TWO = {"payload__phase_starts": [0.0, 50.0], "payload__spin_hz": [5.0, 2.0], "payload__coning_angle_deg": [9.0, 8.0]}
 CONFLICTS = [
     ("cells", {"cells__normals": [1, 0, 0] * 33}, "cells.normals: 33 rows given, expected 1 to 32"),
     ("cells", {"cells__normals": [1, 0, 0, 0, 2, 0]}, "cells.normals: row 1 has length 2"),
     ("cells", {"cells__clip_normal": [0, 0, 0.1]}, "cells.clip_normal: length 0.1 given"),
     ("payload", {"payload__phase_starts": [1.0]}, "payload.phase_starts: [1.0] given, expected times that grow from 0"),
-    ("payload", PHASES, "payload.coning_period: 1 values given, expected 2, one for each phase"),
-    ("payload", {"payload__coning_period": [0.05]}, "payload.coning_period: the coning is 3.67 times as fast as the"),
-    ("payload", {"payload__flat_spin_start": 0.0}, "payload.flat_spin_start: 0 given, expected a time after the last"),
-    ("payload", {"payload__flat_spin_angle_deg": 6.0}, "payload.flat_spin_angle_deg: expected more than half the"),
+    ("payload", ONE | TWO, "payload.coning_period: 1 values given, expected 2, one for each phase"),
+    (
+        "payload",
+        ONE | {"payload__coning_period": [0.05]},
+        "payload.coning_period: the coning is 3.67 times as fast as the",
+    ),
+    (
+        "payload",
+        ONE | {"payload__flat_spin_start": 0.0},
+        "payload.flat_spin_start: 0 given, expected a time after the last",
+    ),
+    (
+        "payload",
+        ONE | {"payload__flat_spin_angle_deg": 6.0},
+        "payload.flat_spin_angle_deg: expected more than half the",
+    ),
     ("slits", {"slits__head_azimuths_deg": []}, "slits.head_azimuths_deg: 0 given, expected 1 to 8"),
     ("slits", {"slits__head_azimuths_deg": [0.0, -360.0]}, "slits.head_azimuths_deg: two heads at one place"),
 ]

@@ -2,6 +2,7 @@
 """Environmental torques: symmetric bodies feel none, simple ones what a hand calculation gives."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -159,7 +160,7 @@ def test_each_torque_is_an_option_and_all_add_up():
     dcm = mrp_to_dcm((0.1, 0.2, -0.3))
     shape = {"panels__areas": [1.0, 0.5], "panels__normals": [1.0, 0, 0, 0, 1.0, 0], "panels__centres": [0.1] * 6}
     shape = {k: [float(x) for x in v] for k, v in shape.items()}
-    options = [
+    options: list[dict[str, Any]] = [
         {"disturbances__gravity_gradient": True},
         {"disturbances__aerodynamic": True},
         {"disturbances__solar_pressure": True},
@@ -169,7 +170,7 @@ def test_each_torque_is_an_option_and_all_add_up():
     assert all(np.linalg.norm(t) > 1e-9 for t in singles)
     everything = {k: v for o in options for k, v in o.items()}
     total = disturbance_torque(build(**shape, **everything), INERTIA, dcm, ENVIRONMENT)
-    np.testing.assert_allclose(total, sum(singles), rtol=1e-12)
+    np.testing.assert_allclose(np.array(total), sum(singles), rtol=1e-12)
     assert disturbance_torque(build(**shape), INERTIA, dcm, ENVIRONMENT) == (0.0, 0.0, 0.0)
 
 

@@ -14,6 +14,7 @@ from css_common.random_streams import Stream, random_key
 from css_common.schema import default_values
 from css_common.sections import MISSION, ORBIT, SPACECRAFT, WHEELS
 from css_environment import moving_clouds
+from css_environment.orbit import KeplerianOrbit
 from css_environment.reflectivity import Reflectivity, draw_reflectivity
 from css_sensors.cells import CELLS
 from css_sensors.slits import SLITS
@@ -126,6 +127,7 @@ def slit_draws(key, timer):
 
 def truth_draws(key, plant, grid):
     orbit = orbit_dispersion.case_orbit(plant, key)
+    assert isinstance(orbit, KeplerianOrbit)
     yield from (("orbit", x) for x in (orbit.semi_major_axis, orbit.inclination, orbit.raan, orbit.true_anomaly))
     late = latency.Latency(3.0, 2.0)
     sensors = (latency.CELLS, latency.GYRO, latency.MAGNETOMETER)

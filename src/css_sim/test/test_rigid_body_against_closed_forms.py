@@ -97,7 +97,7 @@ def test_wheel_torque_alone_keeps_inertial_momentum_and_feeds_energy():
         state, _, _ = propagate(PLANT, state, momentum, command, ZERO, 0.1, applied)
         after = [wheel_speed(PLANT.wheels[i], state.omega_bn_b, momentum[i]) for i in range(4)]
         # motor power is torque times relative speed; the trapezium is exact to the curvature of the speed
-        work += 0.1 * command @ (0.5 * (np.array(before) + after))
+        work += 0.1 * float(command @ (0.5 * (np.array(before) + after)))
     np.testing.assert_allclose(momentum_n(PLANT, state, momentum), h_start, atol=1e-12)
     assert kinetic_energy(PLANT, state, momentum) - start_energy == pytest.approx(work, rel=1e-6)
 
@@ -123,9 +123,9 @@ def test_spin_about_a_principal_axis_is_a_plain_rotation():
     state = fly(FREE_BODY, RotationState(ZERO, (0.0, 0.0, rate)), np.zeros(0), np.zeros(0), ZERO, 0.1, 4000)
     angle = rate * duration
     expected = [
-        [math.cos(angle), math.sin(angle), 0],
-        [-math.sin(angle), math.cos(angle), 0],
-        [0, 0, 1],
+        [math.cos(angle), math.sin(angle), 0.0],
+        [-math.sin(angle), math.cos(angle), 0.0],
+        [0.0, 0.0, 1.0],
     ]
     np.testing.assert_allclose(np.array(mrp_to_dcm(state.sigma_bn)), expected, atol=1e-10)
 
@@ -263,7 +263,7 @@ def test_a_fast_tumble_keeps_momentum_and_energy_at_any_period(dt, steps):
     momentum = np.zeros(0)
     end = fly(FREE_BODY, start, momentum, np.zeros(0), ZERO, dt, steps)
     h_start, e_start = momentum_n(FREE_BODY, start, momentum), kinetic_energy(FREE_BODY, start, momentum)
-    np.testing.assert_allclose(momentum_n(FREE_BODY, end, momentum), h_start, atol=1e-4 * norm(h_start))
+    np.testing.assert_allclose(momentum_n(FREE_BODY, end, momentum), h_start, atol=1e-4 * float(norm(h_start)))
     assert kinetic_energy(FREE_BODY, end, momentum) == pytest.approx(e_start, rel=1e-4)
 
 

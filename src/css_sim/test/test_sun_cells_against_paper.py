@@ -54,13 +54,15 @@ def lit_fractions(p, cells, faults, key):
 
 def test_coverage_of_the_sphere():
     # Fig. 1b; the numbers come from an independent program on the same grid, to the digits given
-    fractions = lit_fractions(*build(**PLAIN), NO_FAULTS, KEY)
+    p, cells = build(**PLAIN)
+    fractions = lit_fractions(p, cells, NO_FAULTS, KEY)
     np.testing.assert_allclose(fractions[:5], [0, 0.3508, 0.5145, 0.0938, 0.0408], atol=5.1e-5)
     assert np.all(fractions[5:] == 0)
 
 
 def test_coverage_without_the_body_plane():
-    fractions = lit_fractions(*build(**PLAIN, cells__clip_normal=[0.0, 0.0, 0.0]), NO_FAULTS, KEY)
+    p, cells = build(**PLAIN, cells__clip_normal=[0.0, 0.0, 0.0])
+    fractions = lit_fractions(p, cells, NO_FAULTS, KEY)
     np.testing.assert_allclose(fractions[:5], [0, 0.1753, 0.6900, 0.0938, 0.0408], atol=5.1e-5)
     # closed form: eight cones of 60 deg half angle cover (1 - cos 60 deg) / 2 of the sphere each
     assert fractions @ np.arange(9) == pytest.approx(8 * 0.25, abs=2e-4)

@@ -17,12 +17,12 @@ def test_speeds_are_rounded_to_whole_steps():
 
 def test_noise_is_white_and_each_wheel_has_its_own():
     true = np.array([10.0, -20.0, 30.0, 0.0, 5.0])
-    errors = []
+    rows = []
     for step in range(2000):
         speeds = true.copy()
         report(Tachometer(0.3, 0.0), KEY, step, speeds)
-        errors.append(speeds - true)
-    errors = np.array(errors)
+        rows.append(speeds - true)
+    errors = np.array(rows)
     np.testing.assert_allclose(errors.std(axis=0), 0.3, rtol=0.06)
     np.testing.assert_allclose(errors.mean(axis=0), 0.0, atol=0.03)
     assert np.max(np.abs(np.corrcoef(errors.T) - np.eye(5))) < 0.1

@@ -20,6 +20,7 @@ from typing import NamedTuple
 from css_common.declared import builder, computed, given, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, flag, real, reals
+from css_common.sections import WHEEL_INERTIA
 from css_common.vectors import Vec3, add, norm, scale, subtract, vector_of
 from sunpoint_control.torque_rods import NO_FIELD, TorqueRods, limit_dipoles, rod_dipoles, rod_torque
 from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
@@ -30,7 +31,7 @@ _RPM = math.pi / 30.0
 
 
 def _wheel_inertia(values: Values) -> float:
-    return float(values.wheels.inertia)
+    return 0.0 if math.isnan(values[WHEEL_INERTIA]) else values[WHEEL_INERTIA]  # asked for where wheels are fitted
 
 
 class DumpingParameters(NamedTuple):

@@ -36,8 +36,26 @@ def _inertia(values: Values) -> Mat3:
     return mat3(values.spacecraft.inertia)
 
 
-def _array_normal(values: Values) -> Vec3:
-    return vector_of(values.spacecraft.array_normal)
+_AXIS = reals(
+    "reference.axis",
+    (0.0, 0.0, 0.0),
+    "-",
+    "axis of the body, of any length, to turn to the Sun; zeros: the array normal",
+    length=3,
+    low=-1.0,
+    high=1.0,
+    tunable=True,
+)
+# An axis shorter than this is none.
+_NO_AXIS = 1e-6
+
+
+def _axis(values: Values) -> Vec3:
+    x, y, z = values[_AXIS]
+    length = math.hypot(x, y, z)
+    if length < _NO_AXIS:
+        return vector_of(values.spacecraft.array_normal)
+    return x / length, y / length, z / length
 
 
 class PointingParameters(NamedTuple):
@@ -85,7 +103,7 @@ class PointingParameters(NamedTuple):
         ),
     )
     inertia_b: Mat3 = computed(_inertia)  # [kg m^2]
-    array_normal_b: Vec3 = computed(_array_normal)
+    axis_b: Vec3 = computed(_axis, _AXIS)  # unit, is turned to the Sun
     deadband: float = made(  # [rad]
         math.radians,
         real(

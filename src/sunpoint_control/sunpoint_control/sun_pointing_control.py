@@ -138,7 +138,7 @@ def step(
         rate = norm(omega_bn_b)
         momentum_b = wheel_momentum(p.allocation.wheels, p.dumping.wheel_inertia, wheel_speeds, omega_bn_b)
         if validity != _VALIDITY_NONE:
-            sigma_br, error = error_mrp(sun_b, p.pointing.array_normal_b)
+            sigma_br, error = error_mrp(sun_b, p.pointing.axis_b)
     rate_known = inputs_ok and rate_source != _RATE_NONE
     mode_state = next_mode(
         p.modes,
@@ -175,9 +175,9 @@ def step(
             wanted_rate = search_rate(p.modes, mode_state.search_time)
             torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
         elif mode != MODE_ECLIPSE or p.eclipse_behaviour != _COAST:
-            # in the shadow a spin goes on about the array normal, which was on the Sun
+            # in the shadow a spin goes on about the axis that was on the Sun
             spinning = mode == MODE_ECLIPSE and spin != 0.0
-            wanted_rate = scale(spin, p.pointing.array_normal_b) if spinning else _ZERO
+            wanted_rate = scale(spin, p.pointing.axis_b) if spinning else _ZERO
             torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
 
     allocate(p.allocation, torque_b, torque_out)

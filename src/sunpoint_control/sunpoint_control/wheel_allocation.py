@@ -7,6 +7,7 @@ Beyond the torque limit all motors are scaled together, so that the torque keeps
 clipped.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from css_common.declared import builder, computed, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, integers
+from css_common.sections import WHEEL_AXES, WHEEL_MAX_TORQUE
 from css_common.vectors import Vec3, dot
 
 WHEELS_OUT = integers("wheels_out", (), "-", "indices of wheels out of service, from 0", low=0, high=31, tunable=True)
@@ -32,7 +34,7 @@ def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
 
 
 def _wheels(values: Values) -> np.ndarray:
-    axes_b = np.asarray(values.wheels.axes, dtype=np.float64)
+    axes_b = values[WHEEL_AXES]
     wheels = np.zeros(len(axes_b), WHEEL)
     wheels["gx"], wheels["gy"], wheels["gz"] = axes_b.T
     wheels["mx"], wheels["my"], wheels["mz"] = pseudo_inverse(axes_b, values[WHEELS_OUT]).T
@@ -40,7 +42,7 @@ def _wheels(values: Values) -> np.ndarray:
 
 
 def _max_torque(values: Values) -> float:
-    return float(values.wheels.max_torque)
+    return 0.0 if math.isnan(values[WHEEL_MAX_TORQUE]) else values[WHEEL_MAX_TORQUE]  # asked for where fitted
 
 
 class AllocationParameters(NamedTuple):

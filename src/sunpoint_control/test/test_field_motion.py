@@ -46,15 +46,15 @@ def test_a_pair_gives_the_rate_across_the_field(omega):
     """b' = b x omega, so that b' x b is the rate across the middle of the two directions."""
     motion = followed(parameters(BALL), omega, 2, dt=0.1)
     b = np.divide(field_at(omega, 0.05), np.linalg.norm(FIELD_N))
-    np.testing.assert_allclose(motion.derivative_b, np.cross(b, omega), atol=1e-5 * np.linalg.norm(omega))
-    np.testing.assert_allclose(motion.omega_bn_b, omega - b * (b @ omega), atol=1e-5 * np.linalg.norm(omega))
+    np.testing.assert_allclose(motion.derivative_b, np.cross(b, omega), atol=1e-5 * float(np.linalg.norm(omega)))
+    np.testing.assert_allclose(motion.omega_bn_b, omega - b * (b @ omega), atol=1e-5 * float(np.linalg.norm(omega)))
 
 
 @pytest.mark.parametrize("omega", [(0.05, 0.0, 0.0), (0.0, -0.04, 0.02), (0.03, 0.03, -0.05)])
 def test_the_whole_rate_shows_as_the_field_goes_round(omega):
     """The part about the field line too, which no pair shows; without lag."""
     motion = followed(parameters(BALL), omega, 600)
-    np.testing.assert_allclose(motion.omega_bn_b, omega, atol=1e-3 * np.linalg.norm(omega))
+    np.testing.assert_allclose(motion.omega_bn_b, omega, atol=1e-3 * float(np.linalg.norm(omega)))
 
 
 def test_a_body_that_nutates_is_followed_by_eulers_equation():

@@ -144,7 +144,7 @@ def test_a_mission_without_magnetometer_is_told_that_its_rods_will_rest():
 ALONE = """
 /**:
   ros__parameters:
-    mission: {duration: 30.0, period: 0.25}
+    mission: {duration: 30.0, period: 0.25, epoch: "2026-06-01T00:00:00Z"}
     orbit: {source: elements, altitude: 500.0e+3, inclination_deg: 97.4}
     spacecraft: {inertia: [0.039, 0.0, 0.0, 0.0, 0.034, 0.0, 0.0, 0.0, 0.010], array_normal: [1.0, 0.0, 0.0]}
     wheels: {fitted: false}

@@ -63,6 +63,18 @@ def test_first_cycle_acts():
     assert np.any(output.torque_b)
 
 
+def test_another_axis_is_turned_to_the_sun_as_the_array_normal_is():
+    by_default, by_axis = Cycle(), Cycle(reference__axis=[0.3, -0.6, 0.6])
+    there = Cycle(spacecraft__array_normal=(np.array([0.3, -0.6, 0.6]) / 0.9).tolist())
+    assert by_default.p.pointing.axis_b == (0.0, 0.0, 1.0)
+    turned, normal = by_axis.steps(3), there.steps(3)
+    angle = angle_between(AT_60_DEG, there.p.pointing.axis_b)
+    assert turned.pointing_error == pytest.approx(angle) != by_default.step().pointing_error
+    np.testing.assert_allclose(turned.torque_b, normal.torque_b, rtol=1e-12)
+    on_it = by_axis.steps(5, sun_b=tuple(np.array([0.3, -0.6, 0.6]) / 0.9), omega=ZERO)
+    assert on_it.mode == MODE_SUN_POINT and on_it.pointing_error < 1e-7
+
+
 @pytest.mark.parametrize(("behaviour", "factor"), [("zero", 0.0), ("damp", -0.9)])
 def test_deadband_is_on_the_estimate(behaviour, factor):
     cycle = Cycle(deadband_behaviour=behaviour)

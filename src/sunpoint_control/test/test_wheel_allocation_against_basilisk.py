@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from okeefe_spacecraft import okeefe_values
 
 from css_common.sections import WHEELS
+from css_common.vectors import vector_of
 from sunpoint_control import wheel_allocation
 from sunpoint_control.wheel_allocation import WHEEL, allocate, limit_torques, pseudo_inverse, wheel_momentum
 
@@ -32,7 +33,7 @@ def allocation(axes=None, out=(), **changes):
 
 def allocated(p, torque_b):
     out = np.full(p.wheels.size, np.nan)
-    allocate(p, tuple(float(t) for t in torque_b), out)
+    allocate(p, vector_of(np.asarray(torque_b)), out)
     return out
 
 

@@ -10,6 +10,7 @@ from css_common.declared import merged
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.attitude import attitude_ekf, attitude_options, flight_references
 from css_estimation.attitude.flight_references import FlightReferences
@@ -38,7 +39,7 @@ class AttitudeFilter(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("cells.normals", "orbit.source")
+        return ("cells.normals", *needed_of_orbit(values))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:

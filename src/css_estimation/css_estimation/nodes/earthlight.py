@@ -2,11 +2,14 @@
 """Attitude about all three axes from cells, gyro or wheels, and the orbit; no magnetometer."""
 
 from collections.abc import Iterable
+from types import ModuleType
+from typing import ClassVar
 
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
 from css_estimation.messages import attitude_estimate_fields
 from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.sun_estimator import aiding_of, inputs_of
@@ -17,6 +20,7 @@ from css_msgs.msg import AttitudeEstimate
 class Earthlight(Component):
     """Attitude by the Sun filter: the Sun is one direction, the light of the Earth on the cells the other."""
 
+    algorithm: ClassVar[ModuleType] = earthlight
     shared = ("cells", "orbit", "magnetometer", "spacecraft", "wheels")
     parameters = earthlight.PARAMETERS
 
@@ -30,7 +34,7 @@ class Earthlight(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("cells.normals", "orbit.source")
+        return ("cells.normals", *needed_of_orbit(values), *needed_of_wheel_momentum(values))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
@@ -49,7 +53,7 @@ class Earthlight(Component):
         self._parameters = earthlight.parameters(values)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
-        since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input

@@ -3,10 +3,13 @@
 
 from typing import ClassVar
 
+from css_common.codec import Sample
+from css_common.component import Outgoing, Received
 from css_common.run import node_main
 from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_estimation.sun_filter import sun_filter
+from css_estimation.sun_filter.calibration_report import Calibrated, calibration_line, calibration_report
 
 
 class SunFilter(SunEstimator):
@@ -15,6 +18,25 @@ class SunFilter(SunEstimator):
     algorithm: ClassVar[SunAlgorithm] = sun_filter
     shared = (*SunEstimator.shared, "spacecraft", "wheels")
     parameters = sun_filter.PARAMETERS
+
+    def configure(self) -> None:
+        super().configure()
+        self._mode = sun_filter.MODE_WAITING
+
+    def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        outgoing = super().cycle(stamp_ns, received)
+        estimate = outgoing["estimate"]
+        assert isinstance(estimate, Sample)  # no output of events
+        before, self._mode = self._mode, estimate.mode
+        if before == sun_filter.MODE_EARTH and self._mode == sun_filter.MODE_COASTING:
+            report = self.calibration()
+            if report:
+                self.report(calibration_line(report))
+        return outgoing
+
+    def calibration(self) -> list[Calibrated]:
+        """What the flight has told of the cells so far; empty where they are not calibrated in flight."""
+        return calibration_report(self._parameters, self._memory)
 
 
 main = node_main(SunFilter)

@@ -12,6 +12,7 @@ from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values, choice
+from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
@@ -64,7 +65,7 @@ class Triad(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("orbit.source",)
+        return needed_of_orbit(values)
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:

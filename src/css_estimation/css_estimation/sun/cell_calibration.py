@@ -103,14 +103,18 @@ def add_drift(p: CellCalibration, first: int, covariance, dt: float) -> None:
 
 
 @kernel
+def tilted_normal(normal_b: Vec3, a: float, b: float) -> tuple[Vec3, Vec3, Vec3]:
+    """A normal that is tilted, and the two axes across the nominal one along which it is, by `a` and `b` [rad]."""
+    e1, e2 = axes_across(normal_b)
+    if a == 0.0 and b == 0.0:
+        return normal_b, e1, e2
+    return unit(add(normal_b, add(scale(a, e1), scale(b, e2)))), e1, e2
+
+
+@kernel
 def calibrated_normal(normal_b: Vec3, calibration, i: int) -> tuple[Vec3, Vec3, Vec3]:
     """Normal of cell `i`, and the two axes across the nominal one along which it tilts."""
-    if calibration[i, TILT_1] == 0.0 and calibration[i, TILT_2] == 0.0:
-        e1, e2 = axes_across(normal_b)
-        return normal_b, e1, e2
-    e1, e2 = axes_across(normal_b)
-    tilt = add(scale(calibration[i, TILT_1], e1), scale(calibration[i, TILT_2], e2))
-    return unit(add(normal_b, tilt)), e1, e2
+    return tilted_normal(normal_b, calibration[i, TILT_1], calibration[i, TILT_2])
 
 
 @kernel

@@ -9,8 +9,10 @@ from typing import NamedTuple
 from css_common.declared import given, part, table_of
 from css_common.epochs import mission_epoch
 from css_common.schema import Values, flag
+from css_common.sections import ORBIT_SOURCE
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.mean_earth import MeanEarth, PredictedLight
+from css_estimation.sun.eclipse_detector import SOURCE
 from css_estimation.sun.sun_heading import PREDICTION_ECLIPSED, PREDICTION_SUNLIT, UNKNOWN_SKY, Sky
 
 USE_ORBIT = flag("use_orbit", True, "use the place in orbit, where the mission has one: shadow and light of the Earth")
@@ -64,10 +66,20 @@ class FlightSky:
 
 def flight_sky(values: Values) -> FlightSky | None:
     """The sky that a Sun estimator's values ask for; None when cells decide on eclipse and nobody needs the rest."""
-    uses_light = hasattr(values, "use_orbit") and values[USE_ORBIT] and values.orbit.source != "none"
-    if not uses_light and values.eclipse.source == "sensors":
+    if not asks_for_sky(values):
         return None
-    return FlightSky(values, uses_light, uses_light and hasattr(values, "use_field") and values[USE_FIELD])
+    with_light = knows_place(values)
+    return FlightSky(values, with_light, with_light and USE_FIELD in values and values[USE_FIELD])
+
+
+def asks_for_sky(values: Values) -> bool:
+    """Whether a Sun estimator's values ask for a model of where the spacecraft is."""
+    return (SOURCE in values and values[SOURCE] != "sensors") or knows_place(values)
+
+
+def knows_place(values: Values) -> bool:
+    """Whether an estimator with these values predicts the light of the Earth."""
+    return USE_ORBIT in values and values[USE_ORBIT] and values[ORBIT_SOURCE] != "none"
 
 
 def sky_at(sky: FlightSky | None, stamp_ns: int) -> Sky:

@@ -12,8 +12,17 @@ class SunAlgorithm(Protocol):
     """A module such as `wavg`.
 
     What `parameters` gives is a NamedTuple that the module itself defines: by its type the Monte Carlo finds it.
-    A module may also have `conflicts(values)`, as `Component.conflicts`, and `heading_gain(values)`, the share of a new
-    measurement in its estimate, for the check of the control's gains.
+
+    Direction and body rate are both the algorithm's: `step` gives them in one `SunHeading`, with `rate_source` for
+    where the rate comes from. The rate of the gyro, of successive Sun vectors and of the magnetic field is there for
+    whoever wants it: `sun_tracking.finish_cycle`, with the parameters of `sun_tracking.TrackingParameters`. A filter
+    with the rate in its state (`sun_filter`) writes its own instead and declares none of these but what it reads. What
+    the node does follows from what is declared: with `use_gyro` it hears the gyro, with `rate.use_field` the
+    magnetometer, with `use_wheels` the wheels, with `eclipse.source` or `use_orbit` it asks the flight's own sky.
+
+    A module may also have `conflicts(values)`, as `Component.conflicts`, and, for the check of the control's gains, the
+    share of a new measurement that one cycle takes in: `heading_gain(values)` for the direction, 1 without it, and
+    `rate_gain(values)` for the rate, without it that of the low pass of `rate.cutoff` if this is declared, else 1.
     """
 
     @property

@@ -10,16 +10,16 @@ from css_common.component import Component, Cycles, Input, Outgoing, Output, Rec
 from css_common.kernel import typed_call
 from css_common.message_columns import Columns
 from css_common.schema import Values
+from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
-from css_estimation.sun.eclipse_detector import SOURCE
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
-from css_estimation.sun.flight_sky import USE_FIELD, flight_sky, sky_at
+from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_heading import Aiding, Measured, Sky
-from css_estimation.sun.sun_tracking import RATE_CUTOFF
+from css_estimation.sun.sun_tracking import RATE_CUTOFF, USE_GYRO
 from css_msgs.msg import SunEstimate
 
 _NO_SPEEDS = np.zeros(0)
@@ -27,8 +27,7 @@ _NO_SPEEDS = np.zeros(0)
 
 def hears_field(values: Values) -> bool:
     """Whether an estimator with these values listens to the magnetometer."""
-    by_rate = hasattr(values.rate, "use_field") and values[RATE_BY_FIELD]
-    return by_rate or (hasattr(values, "use_field") and values[USE_FIELD])
+    return any(parameter in values and values[parameter] for parameter in (RATE_BY_FIELD, USE_FIELD))
 
 
 def hears_wheels(values: Values) -> bool:
@@ -37,8 +36,10 @@ def hears_wheels(values: Values) -> bool:
 
 
 def inputs_of(values: Values) -> tuple[Input, ...]:
-    """Cells, gyro, and what else an algorithm with these values listens to."""
-    inputs = [cells_input(values), gyro_input(values)]
+    """Cells, and what else an algorithm with these values listens to."""
+    inputs = [cells_input(values)]
+    if USE_GYRO in values:
+        inputs.append(gyro_input(values))
     if hears_field(values):
         inputs.append(field_input(values))
     if hears_wheels(values):
@@ -46,11 +47,16 @@ def inputs_of(values: Values) -> tuple[Input, ...]:
     return tuple(inputs)
 
 
+def _low_pass_gain(values: Values) -> float:
+    """Share of a new rate that the low pass of `rate.cutoff` takes in; all of it without one."""
+    return low_pass_gain.py_func(values[RATE_CUTOFF], values[PERIOD]) if RATE_CUTOFF in values else 1.0
+
+
 def aiding_of(received: Received, sky: Sky) -> Aiding:
     """What an algorithm is given beside the cells, of the inputs of one stamp."""
     wheels = received.get("wheels")
     return Aiding(
-        *gyro_reading(received["gyro"]),
+        *gyro_reading(received.get("gyro")),
         *field_reading(received.get("field")),
         _NO_SPEEDS if wheels is None else wheels.speed,
         wheels is not None,
@@ -105,7 +111,9 @@ class SunEstimator(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("cells.normals",) if values[SOURCE] == "sensors" else ("cells.normals", "orbit.source")
+        orbit = needed_of_orbit(values) if asks_for_sky(values) else ()
+        wheels = needed_of_wheel_momentum(values) if "wheels" in cls.shared else ()
+        return ("cells.normals", *orbit, *wheels)
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
@@ -116,10 +124,8 @@ class SunEstimator(Component):
     def smoothing(cls, values: Values) -> Smoothing:
         # in plain Python: loading the compiled one takes a second that a check before the flight need not wait for
         heading_gain = getattr(cls.algorithm, "heading_gain", None)
-        return Smoothing(
-            rate=low_pass_gain.py_func(values[RATE_CUTOFF], values.mission.period),
-            heading=1.0 if heading_gain is None else heading_gain(values),
-        )
+        rate_gain = getattr(cls.algorithm, "rate_gain", _low_pass_gain)
+        return Smoothing(rate=rate_gain(values), heading=1.0 if heading_gain is None else heading_gain(values))
 
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)
@@ -134,7 +140,7 @@ class SunEstimator(Component):
         super().tune(values)
         self._parameters = self.algorithm.parameters(values)
 
-    def cycles(self, steps: Cycles) -> Mapping[str, Columns] | None:
+    def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
         # here, as no node in flight needs it
         from css_estimation.sun.heading_loop import loop_of, new_headings
         from css_estimation.sun.sky_table import sky_table

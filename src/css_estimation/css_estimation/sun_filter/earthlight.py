@@ -10,7 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.attitude import dcm_to_mrp
+from css_common.declared import builder
 from css_common.kernel import kernel
+from css_common.schema import Values
 from css_common.vectors import Vec3, matmul, multiply, transpose
 from css_estimation.attitude.attitude_solution import (
     USED_GYRO,
@@ -25,12 +27,29 @@ from css_estimation.sun_filter import options, sun_filter
 from css_estimation.sun_filter.hypotheses import the_only_one
 from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, SunFilterMemory, attitude_block, dcm_of, triple
 from css_estimation.sun_filter.motion import RATE_BY_GYRO
-from css_estimation.sun_filter.sun_filter import MODE_EARTH, SunFilter, SunFilterState, knows_earth
+from css_estimation.sun_filter.options import SunFilterParameters
+from css_estimation.sun_filter.sun_filter import MODE_EARTH, SunFilterState, knows_earth
 
 PARAMETERS = options.PARAMETERS
-parameters = sun_filter.parameters
 conflicts = options.conflicts
 initial_state = sun_filter.initial_state
+
+AIDED_BY_SKY = True
+"""`step` takes what a Sun estimator takes: `Aiding`, with the flight's own sky in it."""
+
+_built = builder(SunFilterParameters)
+
+
+class EarthlightParameters(SunFilterParameters):
+    """The parameters of this filter: by their type a study finds it."""
+
+    __slots__ = ()
+
+
+def parameters(values: Values) -> EarthlightParameters:
+    """Parameters from checked values."""
+    return EarthlightParameters(*_built(values))
+
 
 _NO_BIAS: Vec3 = (0.0, 0.0, 0.0)
 
@@ -42,13 +61,13 @@ class EarthlightMemory(NamedTuple):
     covariance: np.ndarray  # (6, 6) of the attitude error [rad, rotation vector in b] and the gyro bias [rad/s]
 
 
-def initial_memory(p: SunFilter) -> EarthlightMemory:
+def initial_memory(p: SunFilterParameters) -> EarthlightMemory:
     """Nothing known."""
     return EarthlightMemory(sun_filter.initial_memory(p), np.zeros((6, 6)))
 
 
 @kernel
-def _write_covariance(p: SunFilter, x, covariance, by_gyro: bool, out) -> None:
+def _write_covariance(p: SunFilterParameters, x, covariance, by_gyro: bool, out) -> None:
     """Covariance in b; without gyro that of its bias is what it was at the start."""
     dcm_bn = dcm_of(x)
     attitude = matmul(matmul(dcm_bn, attitude_block(covariance)), transpose(dcm_bn))
@@ -67,7 +86,7 @@ def _write_covariance(p: SunFilter, x, covariance, by_gyro: bool, out) -> None:
 
 @kernel
 def step(
-    p: SunFilter, state: SunFilterState, memory: EarthlightMemory, dt: float, voltages, aiding: Aiding
+    p: SunFilterParameters, state: SunFilterState, memory: EarthlightMemory, dt: float, voltages, aiding: Aiding
 ) -> tuple[SunFilterState, AttitudeSolution]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     state, heading = sun_filter.step(p, state, memory.filter, dt, voltages, aiding)

@@ -3,7 +3,8 @@
 
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, multiply
-from css_estimation.sun_filter.cell_update import READABLE, view_of
+from css_estimation.sun_filter.cell_model import view_of
+from css_estimation.sun_filter.cell_update import READABLE
 from css_estimation.sun_filter.memory import SCALE, X_SCALE, dcm_of, forget
 from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.response import respond

@@ -22,7 +22,8 @@ from css_common.vectors import (
 )
 from css_estimation.attitude.field_direction import plausible_field
 from css_estimation.sun.sun_heading import Aiding
-from css_estimation.sun_filter.cell_update import correct
+from css_estimation.sun_filter.calibration import corrected_states
+from css_estimation.sun_filter.cell_update import absorb, correct
 from css_estimation.sun_filter.memory import THETA, SunFilterMemory, dcm_of, quadratic
 from css_estimation.sun_filter.options import SunFilterParameters
 
@@ -47,12 +48,13 @@ def field_usable(p: SunFilterParameters, aiding: Aiding) -> bool:
 
 @kernel
 def read_field(
-    p: SunFilterParameters, field_b: Vec3, field_n: Vec3, states: int, x, covariance, m: SunFilterMemory
+    p: SunFilterParameters, field_b: Vec3, field_n: Vec3, learns: bool, states: int, x, covariance, m: SunFilterMemory
 ) -> FieldReading:
     """Updates an estimate with a measured field [T].
 
     Args:
         field_n: of the model [T].
+        learns: the states of calibration are corrected.
         states: how many of the states are in use.
         m: room.
     """
@@ -63,6 +65,7 @@ def read_field(
     residual = subtract(scale(1.0 / norm(field_b), field_b), along_b)
     lasting = p.field.lasting * inverse * inverse
     noise = p.field.noise * inverse * inverse + lasting
+    corrected = corrected_states(p.cells.shape[0], states, learns)
     gained, correction = m.work[0], m.work[1]
     for j in range(states):
         correction[j] = 0.0
@@ -83,10 +86,6 @@ def read_field(
         used += 1
         for j in range(states):
             gained[j] = by_theta[0] * covariance[j, 0] + by_theta[1] * covariance[j, 1] + by_theta[2] * covariance[j, 2]
-        for j in range(states):
-            share = gained[j] / (known + noise)
-            correction[j] += share * innovation
-            for k in range(states):
-                covariance[j, k] -= share * gained[k]
+        absorb(gained, innovation, known + noise, corrected, states, correction, covariance)
     correct(p, x, correction, states)
     return FieldReading(likelihood, used, refused)

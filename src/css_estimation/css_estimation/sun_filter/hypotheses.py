@@ -11,6 +11,7 @@ import math
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, axes_across, matmul, multiply_transposed, scale
+from css_estimation.sun_filter.calibration import doubt_calibration
 from css_estimation.sun_filter.memory import (
     DEAD,
     EARTH,
@@ -36,6 +37,8 @@ _NEWS = 0.05
 _GIVEN_UP = -12.0
 # Two hypotheses this near [rad] are one.
 _ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
+# Mean square of the states of the clouds, 1 for clouds, beyond which they are none.
+_NO_CLOUDS = 8.0
 # Errors of a new hypothesis [rad2]: about the Sun line, and across it what the unknown Earth may have done.
 _ROLL_VARIANCE = 0.2**2
 _HEADING_VARIANCE = 0.05**2
@@ -74,12 +77,13 @@ def begin(
     """One hypothesis from a direction of the Sun in b, known to a variance [rad2]; its turn is a definition."""
     x, covariance = m.estimates[0], m.covariances[0]
     set_dcm(x, onto_sun(sun_b, sun_n))
-    for i in range(X_RATE, x.shape[0]):
+    cells = p.cells.shape[0]
+    # the states of calibration behind these outlast a search
+    for i in range(X_RATE, X_GAIN + 2 * cells):
         x[i] = 0.0
-    forget(covariance, 0, covariance.shape[0], 0.0)
+    forget(covariance, 0, GAIN + 2 * cells, 0.0)
     _widen_across(covariance, sun_n, variance + _SEARCH_VARIANCE)
     begin_rate(p.motion, model, (0.0, 0.0, 0.0), p.motion.start_rate, wheels_b, x, covariance)
-    cells = p.cells.shape[0]
     covariance[SCALE, SCALE] = p.errors.scale
     forget(covariance, GAIN, cells, p.errors.cell)
     m.weights[0] = 0.0
@@ -119,6 +123,29 @@ def look_for_roll(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3) -> No
 
 
 @kernel
+def earth_is_elsewhere(p: SunFilterParameters, x) -> bool:
+    """Whether clouds would have to be what no clouds are, for the Earth to be where an estimate has it.
+
+    Their states are in units of their standard deviation. What they make up for is then a wrong turn about the Sun
+    line.
+    """
+    cells = p.cells.shape[0]
+    squares = 0.0
+    for i in range(X_GAIN + cells, X_GAIN + 2 * cells):
+        squares += x[i] * x[i]
+    return squares > _NO_CLOUDS * cells
+
+
+@kernel
+def look_again(p: SunFilterParameters, m: SunFilterMemory, best: int, sun_n: Vec3) -> None:
+    """Looks for the turn anew, from the attitude of a hypothesis; what it has learnt of the cells is in doubt."""
+    if best != 0:
+        _copy(m, best, 0)
+    doubt_calibration(p.calibration, p.cells.shape[0], m.covariances[0])
+    look_for_roll(p, m, sun_n)
+
+
+@kernel
 def _turn(covariance, turn: Mat3) -> None:
     for j in range(covariance.shape[0]):
         a = multiply_transposed(turn, (covariance[THETA, j], covariance[THETA + 1, j], covariance[THETA + 2, j]))
@@ -153,13 +180,14 @@ def loosen(covariance, sun_n: Vec3, since: float, dt: float) -> None:
 
 @kernel
 def weigh(m: SunFilterMemory, k: int, likelihood: float) -> None:
-    """Adds the likelihood of a cycle's outputs to the weight of a hypothesis."""
-    m.weights[k] += _NEWS * likelihood
+    """Adds the likelihood of a cycle's outputs to the weight of a hypothesis; one that is no number is given up."""
+    weight = m.weights[k] + _NEWS * likelihood
+    m.weights[k] = weight if math.isfinite(weight) else DEAD
 
 
 @kernel
 def give_up(m: SunFilterMemory) -> tuple[int, int]:
-    """Gives up what is unlikely, or the same as the best; gives the best one and how many are left."""
+    """Gives up what is unlikely, or the same as the best; gives the best one and how many are left, perhaps none."""
     best = 0
     for k in range(HYPOTHESES):
         if m.weights[k] > m.weights[best]:

@@ -10,6 +10,8 @@ A hypothesis is an attitude with all that goes with it. Its error state, of whic
     EARTH    1   error of all reflectivities in common
     GAIN     N   lasting error of the output of each cell
     then     N   error of the Earth's light on each cell, in units of its standard deviation
+    and      3 N of each cell the error of its gain and two tilts [rad] of its normal (`calibration`), where they are
+                 estimated or considered
 
 In n the direction that cells cannot see, the turn about the Sun line, is the same at all times and after all updates:
 a large variance along it stays there.
@@ -41,20 +43,20 @@ DEAD = -1e300
 class SunFilterMemory(NamedTuple):
     """Of N cells; all written by `sun_filter.step`."""
 
-    estimates: np.ndarray  # (HYPOTHESES, 14 + 2 N)
-    covariances: np.ndarray  # (HYPOTHESES, 9 + 2 N, 9 + 2 N)
+    estimates: np.ndarray  # (HYPOTHESES, 14 + 2 N + C), C the states of calibration, 0 or 3 N
+    covariances: np.ndarray  # (HYPOTHESES, 9 + 2 N + C, 9 + 2 N + C)
     weights: np.ndarray  # (HYPOTHESES,) logarithms, DEAD for those that are not followed
     grid: np.ndarray  # (DIRECTIONS,) logarithms of the weights of directions to the Sun
     earth: np.ndarray  # (N,) light of the Earth on each cell [-]
     earth_slopes: np.ndarray  # (N, 3) its derivatives to a turn of the body [1/rad]
     earth_work: np.ndarray  # (224,) of `css_environment.albedo.new_workspace`
-    work: np.ndarray  # (3, 9 + 2 N)
+    work: np.ndarray  # (3, 9 + 2 N + C)
 
 
-def new_memory(cells: int) -> SunFilterMemory:
-    """Zeros, and one hypothesis with the frames b and n in line."""
-    states = GAIN + 2 * cells
-    estimates = np.zeros((HYPOTHESES, X_GAIN + 2 * cells))
+def new_memory(cells: int, calibrated: int = 0) -> SunFilterMemory:
+    """Zeros, and one hypothesis with the frames b and n in line, of cells with so many states of calibration each."""
+    states = GAIN + (2 + calibrated) * cells
+    estimates = np.zeros((HYPOTHESES, X_GAIN + (2 + calibrated) * cells))
     estimates[:, [0, 4, 8]] = 1.0
     return SunFilterMemory(
         estimates,

@@ -172,6 +172,12 @@ def go_on(
         for i in range(3):
             covariance[j, THETA + i] += added[i]
             covariance[j, RATE + i] = after[i]
+    # what rounding has made unequal would grow with every turn that the motion makes of it, and nothing takes it away
+    for i in range(RATE + 3):
+        for j in range(i):
+            covariance[i, j] = covariance[j, i] = 0.5 * (covariance[i, j] + covariance[j, i])
+        for j in range(RATE + 3, states):
+            covariance[i, j] = covariance[j, i] = 0.5 * (covariance[i, j] + covariance[j, i])
     for i in range(3):
         covariance[THETA + i, THETA + i] += attitude_noise + _TURN_NOISE * dt
         covariance[RATE + i, RATE + i] += rate_noise

@@ -16,6 +16,8 @@ from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import EclipseParameters
 from css_estimation.sun.flight_sky import USE_FIELD
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
+from css_estimation.sun_filter import calibration_options
+from css_estimation.sun_filter.calibration_options import Calibration, lasting_error
 from css_sensors.cells import half_view_cosine, plane_sides
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
@@ -95,11 +97,6 @@ def _inverse_inertia(values: Values) -> Mat3:
     return mat3(np.linalg.inv(np.array(_inertia(values))))
 
 
-def _lasting(gain: float, tilt_deg: float) -> float:
-    """Variance of a cell's output relative to its own, by gain and by a tilt where that matters most, at 60 deg."""
-    return gain**2 + (math.tan(math.radians(60.0)) * math.radians(tilt_deg)) ** 2
-
-
 class Response(NamedTuple):
     """Output of a cell over the light that it receives."""
 
@@ -123,17 +120,12 @@ class CellErrors(NamedTuple):
         real("scale_sigma", 0.02, "-", "slow error of the output common to all cells, 1 sigma", low=0.0, high=1.0),
     )
     scale_time: float = given(real("scale_time", 3000.0, "s", "correlation time of it", low=1.0, high=1e9))
-    cell: float = made(
-        _lasting,
-        real("gain_sigma", 0.002, "-", "lasting error of each cell's gain, 1 sigma", low=0.0, high=1.0),
-        real(
-            "tilt_sigma_deg",
-            0.1,
-            "deg",
-            "lasting error of each cell's normal about an axis, 1 sigma",
-            low=0.0,
-            high=45.0,
-        ),
+    cell: float = computed(
+        lasting_error,
+        calibration_options.MODE,
+        calibration_options.GAIN_SIGMA,
+        calibration_options.TILT_SIGMA,
+        calibration_options.RESIDUAL,
     )
     cell_time: float = given(
         real(
@@ -310,6 +302,7 @@ class SunFilterParameters(NamedTuple):
     cos_half_view: float = computed(half_view_cosine)
     response: Response = part(Response)
     errors: CellErrors = part(CellErrors)
+    calibration: Calibration = part(Calibration)
     earth: EarthErrors = part(EarthErrors)
     motion: Motion = part(Motion)
     field: Field = part(Field)
@@ -331,6 +324,11 @@ def conflicts(values: Values) -> Iterator[str]:
         yield f"{GAINS.name}: {np.min(values[GAINS]):g} given, expected gains above 0; a dead cell is left out as NaN"
     if len(values[NORMALS]) and np.any(np.linalg.norm(np.reshape(values[NORMALS], (-1, 3)), axis=1) < _NO_NORMAL):
         yield f"{NORMALS.name}: a row of zeros given, expected normals"
+    if values[calibration_options.MODE] == "estimate" and not flight_sky.knows_place(values):
+        yield (
+            f"{calibration_options.MODE.name}: estimate given, but the place in orbit is not known, and the light of "
+            "the Earth would be taken for gains; expected consider, or use_orbit and an orbit"
+        )
     if values[CURVE] == "table" and len(values[TABLE]) < _FEWEST:
         yield f"{TABLE.name}: {len(values[TABLE])} numbers given, but the curve is `table`; expected at least {_FEWEST}"
     if len(values.spacecraft.inertia):

@@ -23,7 +23,7 @@ from css_common.declared import builder
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
 from css_common.schema import Values
-from css_common.vectors import Vec3, matmul, multiply, norm, scale, unit
+from css_common.vectors import Vec3, dot, matmul, multiply, norm, scale, unit
 from css_estimation.sun import eclipse_detector
 from css_estimation.sun.eclipse_detector import EclipseState, detect_eclipse
 from css_estimation.sun.low_pass import low_pass, low_pass_gain
@@ -41,10 +41,25 @@ from css_estimation.sun.sun_heading import (
 )
 from css_estimation.sun.sun_tracking import elapsed
 from css_estimation.sun_filter import options
+from css_estimation.sun_filter.calibration import (
+    begin_calibration,
+    calibrates_now,
+    outlast_estimate,
+    states_in_use,
+)
 from css_estimation.sun_filter.cell_update import NOTHING_READ, READABLE, CellReading, heading_sigma, read_cells
 from css_estimation.sun_filter.fading import fading
 from css_estimation.sun_filter.field_update import field_usable, read_field
-from css_estimation.sun_filter.hypotheses import begin, give_up, look_for_roll, loosen, the_only_one, weigh
+from css_estimation.sun_filter.hypotheses import (
+    begin,
+    earth_is_elsewhere,
+    give_up,
+    look_again,
+    look_for_roll,
+    loosen,
+    the_only_one,
+    weigh,
+)
 from css_estimation.sun_filter.memory import (
     DEAD,
     DIRECTIONS,
@@ -175,7 +190,9 @@ def initial_state(p: SunFilterParameters) -> SunFilterState:
 
 def initial_memory(p: SunFilterParameters) -> SunFilterMemory:
     """Room for all hypotheses."""
-    return new_memory(len(p.cells))
+    memory = new_memory(len(p.cells), p.calibration.per_cell)
+    begin_calibration.py_func(p.calibration, len(p.cells), memory.estimates[0], memory.covariances[0])
+    return memory
 
 
 def heading_gain(values: Values) -> float:
@@ -271,12 +288,14 @@ def _search(
 
 
 @kernel
-def _forget_slowly(p: SunFilterParameters, dt: float, rate: float, states: int, x, covariance) -> None:
+def _forget_slowly(
+    p: SunFilterParameters, dt: float, rate: float, states: int, earth_known: bool, x, covariance
+) -> None:
     """Errors of outputs and Earth go on; on a body that turns [rad/s] a cell soon looks at other clouds."""
     cells = p.cells.shape[0]
     fade(SCALE, X_SCALE, 1, p.errors.scale_time, p.errors.scale, dt, states, x, covariance)
     fade(GAIN, X_GAIN, cells, p.errors.cell_time, p.errors.cell, dt, states, x, covariance)
-    if states > GAIN + cells:
+    if earth_known:
         fade(EARTH, X_EARTH, 1, p.earth.scale_time, p.earth.scale, dt, states, x, covariance)
         clouds_time = 1.0 / (1.0 / p.earth.clouds_time + rate / p.earth.clouds_angle)
         fade(GAIN + cells, X_GAIN + cells, cells, clouds_time, 1.0, dt, states, x, covariance)
@@ -308,7 +327,8 @@ def _track(
     sun_n, dt = aiding.sky.sun_n, cycle.dt
     cells = p.cells.shape[0]
     earth_known = before.stage == _STAGE_ROLL
-    states = GAIN + (2 * cells if earth_known else cells)
+    states = states_in_use(p.calibration, cells, earth_known)
+    learns = earth_known and calibrates_now(p.calibration, before.since)
     faded, use = before.faded, cycle.lit
     best, left = 0, 1
     r_n = aiding.sky.r_n if earth_known else _NOWHERE
@@ -320,11 +340,12 @@ def _track(
         if cycle.model != state.rate.model:
             change_rate(p.motion, state.rate.model, cycle.model, state.rate.raw_b, cycle.wheels_b, x, covariance)
         omega_b = go_on(p.motion, cycle.model, aiding.gyro_b, cycle.wheels_b, r_n, dt, states, x, covariance)
-        _forget_slowly(p, dt, norm(omega_b), states, x, covariance)
+        _forget_slowly(p, dt, norm(omega_b), states, earth_known, x, covariance)
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
-    # while turns are looked for outputs are not as expected; a model of the orbit may be late by as much as a place errs
+    # while turns are looked for outputs are not as expected; a model of the orbit may be late by as much as a place
+    # errs
     settled = not earth_known or the_only_one(memory) == best
     if not use:
         # light that comes back has to be whole again
@@ -347,6 +368,7 @@ def _track(
                 cycle.flux,
                 more_noise,
                 earth_known,
+                learns,
                 aiding.sky.light,
                 states,
                 x,
@@ -360,7 +382,7 @@ def _track(
         for k in range(HYPOTHESES):
             if memory.weights[k] > DEAD:
                 x, covariance = memory.estimates[k], memory.covariances[k]
-                field = read_field(p, aiding.field_b, aiding.sky.field_n, states, x, covariance, memory)
+                field = read_field(p, aiding.field_b, aiding.sky.field_n, learns, states, x, covariance, memory)
                 weigh(memory, k, field.likelihood)
         use_field = True
     if use or use_field:
@@ -398,7 +420,7 @@ def _progress(
         if refused + reading.nis_dof > 0:
             share = 1.0 if reading.contrary > 0 else refused / (refused + reading.nis_dof)
             contrary += (share - contrary) * min(1.0, cycle.dt / _CONTRARY_TIME)
-    if _lost(p, contrary, sigma, x, sun_n, cycle.flux, voltages):
+    if left == 0 or _lost(p, contrary, sigma, x, sun_n, cycle.flux, voltages):
         return _AFRESH, mode
     if contrary > _CONTRARY_SHARE:
         contrary = 0.0
@@ -409,6 +431,9 @@ def _progress(
     if use and aiding.sky.known and converged:
         look_for_roll(p, memory, sun_n)
         stage, since = _STAGE_ROLL, 0.0
+    elif stage == _STAGE_ROLL and left == 1 and earth_is_elsewhere(p, x):
+        look_again(p, memory, best, sun_n)
+        since = 0.0
     return Progress(stage, True, since, contrary, faded), mode
 
 
@@ -443,6 +468,7 @@ def step(
     if state.progress.stage == _STAGE_SEARCH or dt > p.convergence.longest_step:
         if state.progress.stage != _STAGE_SEARCH:
             state = SunFilterState(_AFRESH, state.rate, _NOT_FOUND, state.validity, state.age, state.eclipse)
+            outlast_estimate(p.calibration, p.cells.shape[0], memory, True)
         progress, rate, found = _search(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = found.sun_b, across(found.sun_b, min(found.variance, LARGEST))
         mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
@@ -452,11 +478,14 @@ def step(
     else:
         progress, rate, reading, mode = _track(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = heading_of(p, memory, aiding.sky.sun_n, progress.stage == _STAGE_ROLL)
-        if not (_finite(sun_b) and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
-            # beyond what numbers can hold: nothing is known any more
+        a_direction = _finite(sun_b) and dot(sun_b, sun_b) > 0.0 and mean_variance(covariance) > 0.0
+        if not (a_direction and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
+            # no hypothesis is left, or beyond what numbers can hold: nothing is known any more
             progress, rate = _AFRESH, Rate(rate.model, _NO_RATE, _NO_RATE)
             reading, mode = NOTHING_READ, MODE_COASTING
             sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
+        if progress.stage == _STAGE_SEARCH:
+            outlast_estimate(p.calibration, p.cells.shape[0], memory, False)
         used = reading.nis_dof > 0
         rate_source = RATE_SUN
         if cycle.model == RATE_BY_GYRO:

@@ -10,7 +10,8 @@ import math
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, axes_across, dot, multiply, unit
-from css_estimation.sun_filter.cell_update import READABLE, view_of
+from css_estimation.sun_filter.cell_model import view_of
+from css_estimation.sun_filter.cell_update import READABLE
 from css_estimation.sun_filter.memory import DIRECTIONS
 from css_estimation.sun_filter.options import SunFilterParameters
 

@@ -5,11 +5,8 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from css_common.command import USAGE, command_parser, complain, guarded
-from css_common.progress_lines import still_working
+from css_common.command import USAGE, command_parser, complain, guarded, implementation
 from css_recording.errors import BagError
-from css_recording.recovery import recover
-from css_recording.salvage import RecoveryReport
 
 _DESCRIPTION = """\
 Finish a recording whose recorder was killed: keep every intact chunk, index it, and write the metadata that
@@ -32,24 +29,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not options.recording.exists():
         complain(parser.prog, f"{options.recording}: there is no such recording")
         return USAGE
-    return guarded(parser.prog, lambda: _run(options.recording, options.output), (), (BagError,))
-
-
-def _run(recording: Path, output: str | None) -> int:
-    with still_working(f"recovering {recording}"):
-        report = recover(recording, output)
-    print(_summary(report))
-    return 0
-
-
-def _summary(report: RecoveryReport) -> str:
-    total = sum(report.messages.values())
-    state = "was complete" if report.was_complete else "recovered"
-    lines = [f"{report.recording}: {state}, {total} messages"]
-    lines += [f"  {count:9d}  {topic}" for topic, count in report.messages.items()]
-    lines += [f"lost or in doubt: {loss}" for loss in report.losses]
-    lines += [f"note: {note}" for note in report.notes]
-    return "\n".join(lines)
+    run = implementation("css_recording.verbs.recover")
+    return guarded(parser.prog, lambda: run(options.recording, options.output), (), (BagError,))
 
 
 if __name__ == "__main__":

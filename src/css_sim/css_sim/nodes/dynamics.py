@@ -13,7 +13,18 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
-from css_common.sections import CASE, DURATION, PERIOD, ROD_AXES, RODS_FITTED, SEED, WHEEL_AXES, WHEELS_FITTED
+from css_common.sections import (
+    CASE,
+    DURATION,
+    PERIOD,
+    ROD_AXES,
+    RODS_FITTED,
+    SEED,
+    WHEEL_AXES,
+    WHEELS_FITTED,
+    needed_of_orbit,
+    needed_of_wheels,
+)
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
 from css_sim import disturbances, flight_environment, initial_conditions, orbit_dispersion, tachometer
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
@@ -74,8 +85,7 @@ class Dynamics(Plant):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        wheels = ("wheels.axes",) if values[WHEELS_FITTED] else ()
-        return ("orbit.source", "spacecraft.inertia", *wheels)
+        return (*needed_of_orbit(values), "spacecraft.inertia", *needed_of_wheels(values))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:

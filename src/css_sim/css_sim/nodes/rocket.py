@@ -12,9 +12,10 @@ from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import CASE, DURATION, PERIOD, SEED
+from css_common.sections import CASE, DURATION, PERIOD, SEED, needed_of_orbit
 from css_environment.orbit_checks import field_findings, orbit_findings
 from css_msgs.msg import SpacecraftState
+from css_sensors.payload import needed_of_payload
 from css_sim import flight_environment
 from css_sim.flight_environment import GEOMAGNETIC_FIELD
 from css_sim.spinning_payload import payload_motion, payload_state
@@ -32,7 +33,7 @@ class Rocket(Plant):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("orbit.source",)
+        return (*needed_of_orbit(values), *needed_of_payload(values))
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:

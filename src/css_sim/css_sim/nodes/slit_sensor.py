@@ -12,9 +12,10 @@ from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import CASE, PERIOD, SEED
+from css_common.sections import CASE, PERIOD, SEED, needed_of_orbit
 from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import SlitPulse, SlitPulses, SpacecraftState
+from css_sensors.payload import needed_of_payload
 from css_sensors.slits import HEAD_AZIMUTHS, SLITS_PER_HEAD, TIMER_SPAN
 from css_sim import slit_timer
 from css_sim.slit_crossings import slit_crossings, slit_geometry
@@ -45,7 +46,7 @@ class SlitSensor(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("orbit.source",)
+        return (*needed_of_orbit(values), *needed_of_payload(values))
 
     def configure(self) -> None:
         values = self.values

@@ -8,6 +8,7 @@ from css_common.component import Finding
 from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values
+from css_common.sections import needed_of_wheels
 from sunpoint_control import sun_pointing_control
 from sunpoint_control.control_algorithm import ControlAlgorithm
 from sunpoint_control.control_checks import control_findings
@@ -22,7 +23,7 @@ class MrpControl(Controller):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return ("spacecraft.inertia", "wheels.axes") if values.wheels.fitted else ("spacecraft.inertia",)
+        return ("spacecraft.inertia", *needed_of_wheels(values))
 
     @classmethod
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:

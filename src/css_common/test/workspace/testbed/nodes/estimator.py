@@ -2,13 +2,14 @@
 """An estimator with every fault that a component may have, on demand."""
 
 from collections.abc import Iterable
+from typing import ClassVar, cast
 
 import numpy as np
 from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
 from css_common.component import Component, Input, Outgoing, Output, Received
-from css_common.schema import ParameterError, Values, choice, flag, integer, real, reals, text, texts
+from css_common.schema import ParameterError, Table, Values, choice, flag, integer, real, reals, text, texts
 from css_msgs.msg import CssVoltages, SunEstimate
 from testbed.nodes.compass import DIVIDER
 
@@ -19,7 +20,7 @@ class Estimator(Component):
     """Puts gain times the first voltage into the age of its estimate, and the number of its cycles into nis."""
 
     shared = ("cells",)
-    parameters = (
+    parameters: ClassVar[Table] = (
         real("gain", 1.0, "-", "factor of the voltage", low=0.0, high=10.0, tunable=True),
         real("floor", 0.0, "V", "least voltage", tunable=True),
         real("width_deg", 30.0, "deg", "never used", low=0.0, high=90.0, open_low=True),
@@ -73,7 +74,7 @@ class Estimator(Component):
         if fault == "raise":
             raise ZeroDivisionError("on demand")
         if fault == "nothing":
-            return None
+            return cast(Outgoing, None)
         self.count += 1
         self.cycles.append((stamp_ns, dict(received)))
         estimate = codec_of(SunEstimate).sample(stamp_ns, self.frames["estimate"])

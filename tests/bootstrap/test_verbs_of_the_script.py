@@ -3,8 +3,10 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
+from noting import noted
 
 from bootstrap import checks, cli
 from bootstrap.cli import main
@@ -63,10 +65,10 @@ def test_version_without_a_checkout(tmp_path):
 @pytest.fixture
 def started(monkeypatch):
     """What the verbs become, and which linters ran."""
-    happened = []
+    happened: list[Any] = []
     monkeypatch.setattr(cli, "find_need", lambda *_: False)
-    monkeypatch.setattr(cli, "_replace_process", lambda command, env: happened.append(command[2:]) or 0)
-    monkeypatch.setattr(checks, "failing_linters", lambda project, env: happened.append("linters") or [])
+    monkeypatch.setattr(cli, "_replace_process", lambda command, env: noted(happened, command[2:], 0))
+    monkeypatch.setattr(checks, "failing_linters", lambda project, env: noted(happened, "linters", []))
     monkeypatch.chdir(Path.cwd())
     return happened
 
