@@ -4,6 +4,8 @@
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +20,8 @@ from css_bringup.replay_stretch import Stretch
 from css_common.codec import Sample, codec_of
 from css_common.component import Cycles
 from css_estimation.nodes.ekf import Ekf
+from css_estimation.nodes.wavg import Wavg
+from css_estimation.sun import wavg
 from css_msgs.msg import CssVoltages, SunEstimate
 from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
@@ -215,3 +219,33 @@ def test_a_cycle_that_fails_in_between_fails_alone(taken_at_once, tmp_path, monk
     monkeypatch.setattr(Ekf, "cycle_through", cycle_through)
     result = both_ways(REFERENCE, tmp_path, "ekf:gyro=off", "ekf")
     assert [run["counts"][:2] for run in result["runs"]] == [(STEPS - 1, 1)] * 2
+
+
+def test_an_estimator_with_a_cycle_of_its_own_is_stepped_by_it(tmp_path, monkeypatch):
+    def held(component: Wavg, stamp_ns: int, received: object) -> dict:
+        return {"estimate": component.message("estimate", stamp_ns, **FIELDS)}
+
+    fields = codec_of(SunEstimate).sample(0, "")
+    FIELDS = {field.name: getattr(fields, field.name) for field in codec_of(SunEstimate).fields}
+    monkeypatch.setattr(Wavg, "cycle", held)
+    both_ways(REFERENCE, tmp_path, "wavg")
+    messages = messages_by_topic(tmp_path / "at_once" / "replay")["/wavg/sun_estimate"]
+    assert not any(any(codec_of(SunEstimate).decode(data).sun_b) for _, data in messages)
+
+
+def test_an_algorithm_with_parameters_of_another_is_stepped_by_its_own(taken_at_once, tmp_path, monkeypatch):
+    called = []
+
+    def step(*given: Any) -> Any:
+        called.append(given)
+        return wavg.step(*given)
+
+    names = ("PARAMETERS", "parameters", "initial_state", "initial_memory")
+    mirrored = SimpleNamespace(**{name: getattr(wavg, name) for name in names}, step=step)
+    monkeypatch.setattr(Wavg, "algorithm", mirrored)
+    with BagReader(REFERENCE) as reader:
+        stepping = Replay(reader, mission_of_bag(REFERENCE, {}, (), None), [parse_request("wavg")], ())
+        stepping.long_from = 0
+        assert stepping.runs[0].stepper.offers_steps
+        stepping.run(None)
+    assert (len(called), stepping.runs[0].messages, stepping.runs[0].failures) == (STEPS, STEPS, 0)

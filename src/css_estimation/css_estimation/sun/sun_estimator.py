@@ -142,11 +142,13 @@ class SunEstimator(Component):
 
     def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
         # here, as no node in flight needs it
+        from css_estimation.sun.heading_dispatch import home_of
         from css_estimation.sun.heading_loop import loop_of, new_headings
         from css_estimation.sun.sky_table import sky_table
 
         measured = measured_in(steps)
-        if measured is None:
+        # the loop finds `step` by the type of the parameters, which may be those of another module
+        if measured is None or getattr(home_of(self._parameters), "step", None) is not self.algorithm.step:
             return None
         stamps = steps.stamps_ns
         before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns
