@@ -55,7 +55,12 @@ def test_nodes_that_die_are_restarted_and_nothing_is_lost_with_them(tmp_path):
     bag = tmp_path / "bag"
     # one after the other, each in another part of the flight
     killers = [_Killer(n, 1, bag, 50_000 * k) for k, n in enumerate(("css_array", "ekf", "mrp_control"), 1)]
-    result = fly_processes(mission, bag, tmp_path / "logs", lambda supervisor: [kill(supervisor) for kill in killers])
+
+    def kill(supervisor) -> None:
+        for killer in killers:
+            killer(supervisor)
+
+    result = fly_processes(mission, bag, tmp_path / "logs", kill)
     assert result.failure == ""
     assert result.steps == 600
     assert all(f"{killer.name} died (SIGKILL) and was restarted" in result.notes for killer in killers)
