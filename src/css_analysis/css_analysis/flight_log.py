@@ -14,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from css_analysis.fault_record import FaultRecord, fault_records
 from css_common.attitude import mrp_to_dcm
-from css_common.codec import Codec, DecodeError, codec_of
+from css_common.codec import Codec, DecodeError, Sample, codec_of, type_name
 from css_common.kernel import kernel
 from css_common.message_columns import Columns, stack
 from css_common.mission import Mission, MissionError, mission_from_text
@@ -25,6 +26,7 @@ from css_msgs.msg import (
     AttitudeEstimate,
     ControlStatus,
     CssVoltages,
+    Faults,
     RodDipoleCommand,
     SpacecraftState,
     SunEstimate,
@@ -90,6 +92,7 @@ class FlightLog:
         attitudes: name of the attitude filter to `AttitudeEstimate` columns.
         voltages, wheels, torque_command, rod_command, control: columns of the topic, None when there is none.
         true_wheels: `WheelState` columns with the true speeds, None where those reported are true.
+        faults: those that sensors and actuators told of, node by node.
         notes: what could not be read, one line each.
         imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
             arrays of its mission are unknown.
@@ -106,6 +109,7 @@ class FlightLog:
     rod_command: Columns | None = None
     control: Columns | None = None
     true_wheels: Columns | None = None
+    faults: list[FaultRecord] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     imported: bool = False
 
@@ -258,15 +262,20 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         messages: dict[str, tuple[type, list[bytes]]] = {
             topic.name: (LOGGED_TYPES[topic.type], []) for topic, _ in reader.topics if topic.type in LOGGED_TYPES
         }
+        told = {topic.name for topic, _ in reader.topics if topic.type == type_name(Faults)}
         if not messages:
             raise BagError(f"{path}: holds no truth, estimate, cell output, wheel or control message")
+        messages |= {name: (Faults, []) for name in told}
         append = {topic: received.append for topic, (_, received) in messages.items()}
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
         notes += [*reader.notes, *map(str, reader.refused)]
     log = FlightLog(str(path), mission, notes=notes, imported=imported)
     for topic, (message_type, received) in messages.items():
-        log.add(topic, message_type, _whole(topic, codec_of(message_type), received, notes).sorted())
+        if topic not in told:
+            log.add(topic, message_type, _whole(topic, codec_of(message_type), received, notes).sorted())
+    for topic in sorted(told):
+        log.faults += fault_records(_each_whole(topic, codec_of(Faults), messages[topic][1], notes), log.epoch_ns)
     return log
 
 
@@ -279,6 +288,14 @@ def _whole(topic: str, codec: Codec, received: list[bytes], notes: list[str]) ->
         count = len(received) - len(good)
         notes.append(f"topic {topic}: {count} of {len(received)} messages left out: {error}")
         return stack(codec, good)
+
+
+def _each_whole(topic: str, codec: Codec, received: list[bytes], notes: list[str]) -> list[Sample]:
+    """The messages that are whole, of a type whose columns differ in length; others are noted."""
+    good = [data for data in received if _decodes(codec, data)]
+    if len(good) < len(received):
+        notes.append(f"topic {topic}: {len(received) - len(good)} of {len(received)} messages left out")
+    return [codec.decode(data) for data in good]
 
 
 def _decodes(codec: Codec, data: bytes) -> bool:

@@ -28,6 +28,7 @@ from css_estimation.spin import slit_measurement
 from css_estimation.spin.slit_record import SlitRecord, read_record
 from css_sensors.slits import SLITS_PER_HEAD, TIMER_SPAN, head_azimuths
 from css_sim import magnetometer, slit_timer
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.slit_crossings import slit_crossings, slit_geometry
 from css_sim.spinning_payload import PayloadMotion, payload_motion, payload_state
 
@@ -105,7 +106,7 @@ def _attitude(
     for k in range(first, first + 4):
         field_n = environment.at(k * spacing).field_n
         field_b = multiply(payload_state(motion, k * spacing).dcm_bn, field_n)
-        samples.append(magnetometer.measure(p, bias_b, key, k, field_b))
+        samples.append(magnetometer.measure(p, bias_b, NO_FAULTS, key, k, field_b))
     u = time / spacing - (first + 1)
     before, left, right, after = samples
     field = interpolated_field(before, left, right, after, u)

@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from css_common import fault_lines
 from css_common.codec import Sample
 from css_common.epochs import mission_epoch
+from css_common.fault_lines import FaultKind, Units
 from css_common.message_columns import Columns
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
@@ -146,10 +148,12 @@ class Component:
     Class attributes:
         shared: mission sections whose values the component reads (`shared_sections`), besides mission and io.
         parameters: its own parameters.
+        fault_kinds: what its units may do wrong (`fault_lines`); it then has the parameter `faults`.
     """
 
     shared: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[Table] = ()
+    fault_kinds: ClassVar[tuple[FaultKind, ...]] = ()
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
     _needed_by_host: ClassVar[tuple[str, ...]] = ()
 
@@ -197,6 +201,11 @@ class Component:
         return ()
 
     @classmethod
+    def fault_units(cls, values: Values) -> Units:
+        """Names of the units that may have the faults of `fault_kinds`, by their sort."""
+        return {}
+
+    @classmethod
     def preflight(cls, node: "Node", graph: Mapping[str, "Node"]) -> Iterable[Finding]:
         """What a flight with these values would do that physics or numerics forbid; see `css_common.preflight`.
 
@@ -220,6 +229,10 @@ class Component:
     def tune(self, values: Values) -> None:
         """Takes new values of tunable parameters in flight; the state stays."""
         self.values = values
+
+    def untimely(self, values: Values) -> str | None:
+        """Why it cannot take values in flight that it could have begun with, or None."""
+        return None
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         """One step: the inputs of one stamp (None for what is silent or not due) to the outputs of that stamp."""
@@ -282,4 +295,8 @@ def all_conflicts(component_type: type[Component], values: Values) -> Iterator[s
     """What is wrong between the values of a component; what is missing comes first, for the rest builds on it."""
     yield from missing_values(component_type, values)
     yield from conflicts(values)
+    if component_type.fault_kinds:
+        yield from fault_lines.conflicts(
+            values[fault_lines.FAULTS], component_type.fault_kinds, component_type.fault_units(values)
+        )
     yield from component_type.conflicts(values)

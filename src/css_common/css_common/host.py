@@ -30,6 +30,7 @@ from css_common.codec import Sample, codec_of
 from css_common.component import Component, Outgoing, Output, Plant
 from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import Edge
+from css_common.fault_services import FaultServices
 from css_common.matching import Matcher
 from css_common.mission import Event, Mission
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
@@ -107,7 +108,7 @@ class ComponentNode(LifecycleNode):
         self.matcher: Matcher = None  # type: ignore[assignment]
         self._table = component_type.table()
         try:
-            self._canonical = self._declare()
+            self.canonical = self._declare()
         except BaseException:
             self.destroy_node()  # nobody else will: it is handed to nobody
             raise
@@ -127,13 +128,18 @@ class ComponentNode(LifecycleNode):
         self._deadline_timer: Timer | None = None
         self._overdue_stamp: int | None = None
         self._guard_lifecycle_service()
-        ros_parameters.guard(self, self._table, self._canonical, self._tune, self._conflict)
+        self.fault_services = FaultServices(self) if component_type.fault_kinds else None
+        ros_parameters.guard(self, self._table, self.canonical, self._tune, self._conflict)
+
+    def next_cycle_ns(self) -> int:
+        """Time [ns] after the epoch at which the next cycle is due."""
+        return max(0, self._last_stamp + self.mission.period_ns - self.mission.epoch_ns)
 
     # Start and transitions
 
     def start(self) -> bool:
         """Configures and activates when the node is to start by itself; False when that failed."""
-        if not self._canonical["autostart"]:
+        if not self.canonical["autostart"]:
             return True
         return self.trigger_configure() == _SUCCESS and self.trigger_activate() == _SUCCESS
 
@@ -231,7 +237,7 @@ class ComponentNode(LifecycleNode):
         Raises:
             ParameterError: they do not.
         """
-        reason = self._conflict(self._canonical)
+        reason = self._conflict(self.canonical)
         if reason:
             raise ParameterError(reason)
 
@@ -393,7 +399,7 @@ class ComponentNode(LifecycleNode):
 
     def _stepper(self, name: str) -> Stepper:
         mission = self.mission
-        stepper = Stepper(self.component_type, name, self._canonical, mission.events, mission.epoch_ns)
+        stepper = Stepper(self.component_type, name, self.canonical, mission.events, mission.epoch_ns)
         stepper.is_active = False
         stepper.perform = self._perform
         stepper.failed = self._report_failure
@@ -424,6 +430,8 @@ class ComponentNode(LifecycleNode):
     # Parameters
 
     def _conflict(self, canonical: dict) -> str | None:
+        if self.stepper is not None:
+            return self.stepper.refusal(canonical)
         return conflict(self.component_type, canonical)
 
     def _tune(self, canonical: dict) -> None:

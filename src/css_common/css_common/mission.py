@@ -18,6 +18,7 @@ from typing import Any
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
 from css_common.epochs import mission_epoch
+from css_common.fault_lines import FAULTS, SECTION, Host, entries_of, entry_parameter
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
@@ -60,7 +61,7 @@ __all__ = [
     "mission_from_text",
 ]
 
-_SCRIPTS = ("events.", "criteria.")
+_SCRIPTS = ("events.", "criteria.", SECTION)
 _OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
 _MOST_NODES = 64
 
@@ -91,6 +92,7 @@ class Mission:
     """A validated mission. Use `load_mission`.
 
     Attributes:
+        faults: entries of the section `faults`; the parameters of their nodes have them, too.
         remarks: what is right but may not be what was meant, one line each.
     """
 
@@ -126,12 +128,15 @@ class Mission:
             self.values = shaped_values(known.values(), self.shared)
             _refuse(conflicts(self.values))
         self.nodes = self._build_nodes()
+        with _naming(origin, SHARED):
+            self.faults = entries_of(_below(SECTION, given), self._hosts())
+        self.nodes = tuple(self._with_faults(node) for node in self.nodes)
         tables = {node.name: node.component.table() for node in self.nodes}
         self._check_keys(tables if guest is None else tables | {guest[0]: guest[1].table()})
         self.events = events_of(_below("events.", given), tables, f"{origin}: {SHARED}")
-        if self.events:
+        if self.events or self.faults:
             with _naming(origin, SHARED):
-                _refuse(missing(known.values(), self.values, (EPOCH.name,)))  # from which the times of events count
+                _refuse(missing(known.values(), self.values, (EPOCH.name,)))  # from which times count
         self.criteria = criteria_of(_below("criteria.", given), f"{origin}: {SHARED}")
         self._check_wiring()
         self.remarks = tuple(self._unmeant())
@@ -171,7 +176,7 @@ class Mission:
     def node_of(self, component: type[Component], name: str) -> Node:
         """A node for a component, with the mission's parameters, whether or not the graph lists it."""
         package, _, executable = component.__module__.partition(".nodes.")
-        return self._node(name, package, executable, component)
+        return self._with_faults(self._node(name, package, executable, component))
 
     @property
     def plant(self) -> Node | None:
@@ -271,6 +276,9 @@ class Mission:
         shared = shared_parameters()
         if key in shared:
             return None, shared[key]
+        of_fault = entry_parameter(key, self._hosts().values())
+        if of_fault is not None:
+            return None, of_fault
         head, _, rest = key.partition(".")
         known = [*shared]
         for node in self.nodes:
@@ -333,6 +341,23 @@ class Mission:
             if not (self._alone and any(missing_values(component, values))):
                 _refuse(all_conflicts(component, values))
         return Node(name, package, executable, component, canonical, values)
+
+    def _hosts(self) -> dict[str, Host]:
+        """What may fail, by node."""
+        faulty = [node for node in self.nodes if node.component.fault_kinds]
+        return {n.name: Host(n.component.fault_kinds, n.component.fault_units(n.values)) for n in faulty}
+
+    def _with_faults(self, node: Node) -> Node:
+        """A node with the faults of the mission's entries after those of its own parameter."""
+        lines = [entry.line for entry in self.faults if entry.node == node.name]
+        if not lines:
+            return node
+        canonical = {**node.canonical, FAULTS.name: [*node.canonical[FAULTS.name], *lines]}
+        values = shaped_values(node.component.table(), canonical)
+        if not any(missing_values(node.component, values)):
+            with _naming(self.origin, node.name):
+                _refuse(all_conflicts(node.component, values))
+        return replace(node, canonical=canonical, values=values)
 
     def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
         if entry.message_type is not output.message_type:

@@ -71,6 +71,10 @@ class PlantNode(ComponentNode):
         """Nobody owes an answer to the stamp that the flight has reached."""
         return not self._begun or all(key in self._answers for key in self._needed())
 
+    def next_cycle_ns(self) -> int:
+        """Time [ns] after the epoch of the stamp that the flight has reached: its cycle is yet to come."""
+        return max(0, self._stamp - self.mission.epoch_ns)
+
     def halt(self) -> None:
         """Ends the flight at the stamp it has reached: partners may still answer it, no step follows."""
         self.done = True

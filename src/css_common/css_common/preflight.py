@@ -43,7 +43,7 @@ def preflight(mission: Mission, component: type[Component] | None = None) -> lis
                     raise MissionError(line + when)
                 if not any(line in known for known in warnings):
                     warnings[line + when] = None
-    warnings |= dict.fromkeys(_events_too_late(mission))
+    warnings |= dict.fromkeys(_what_is_too_late(mission))
     return list(warnings)
 
 
@@ -80,10 +80,11 @@ def _line(mission: Mission, node: Node, finding: Finding) -> str:
     return f"{mission.origin}: {SHARED if key in shared_parameters() else node.name}: {finding.text}"
 
 
-def _events_too_late(mission: Mission) -> Iterator[str]:
+def _what_is_too_late(mission: Mission) -> Iterator[str]:
     if not mission.steps:
         return
     last = (mission.steps - 1) * mission.values.mission.period
-    for event in mission.events:
-        if event.time > last + 1e-9:
-            yield f"event {event.name} at {event.time:g} s never comes, the last step is at {last:g} s"
+    for word, scripted in (("event", mission.events), ("fault", mission.faults)):
+        for one in scripted:
+            if one.time > last + 1e-9:
+                yield f"{word} {one.name} at {one.time:g} s never comes, the last step is at {last:g} s"

@@ -44,6 +44,7 @@ class Stream(IntEnum):
     SPIN_PHASE = 23
     CLOUDS = 24
     EPOCH = 25
+    FAULT = 26
 
 
 class RandomKey(NamedTuple):

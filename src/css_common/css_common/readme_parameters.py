@@ -3,7 +3,8 @@
 
     ./sunpoint shell -c 'python -m css_common.readme_parameters src/*/README.md'
 
-writes them anew where they stand: below a heading `### NODE`, with the columns of `HEADER`.
+writes them anew where they stand: below a heading `### NODE`, with the columns of `HEADER`; that of the faults that
+the units of those nodes may have, with the columns of `FAULT_HEADER`.
 """
 
 import re
@@ -12,11 +13,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from css_common.fault_lines import FaultKind
 from css_common.node_files import find_component
 from css_common.schema import Parameter
 
 HEADER = ("| parameter | default | unit | range | meaning |", "|---|---|---|---|---|")
 
+FAULT_HEADER = ("| target | fault | values | what it does |", "|---|---|---|---|")
+
+_FAULTS = re.compile("(?P<before>" + "\n".join(map(re.escape, FAULT_HEADER)) + r"\n)(?:\|.*\n)*")
 _TABLE = re.compile(
     r"(?P<before>^### (?P<node>\w+)\n(?:(?!#).*\n)*?" + "\n".join(map(re.escape, HEADER)) + r"\n)(?:\|.*\n)*", re.M
 )
@@ -33,7 +38,9 @@ def rewritten(text: str, package: str) -> str:
         rows = (f"{row(p)}\n" for p in find_component(package, found["node"]).parameters)
         return found["before"] + "".join(rows)
 
-    return _TABLE.sub(table, text)
+    kinds = dict.fromkeys(kind for node in documented(text) for kind in find_component(package, node).fault_kinds)
+    faults = "".join(f"{fault_row(kind)}\n" for kind in kinds)
+    return _FAULTS.sub(lambda found: found["before"] + faults, _TABLE.sub(table, text))
 
 
 def documented(text: str) -> list[str]:
@@ -46,6 +53,14 @@ def row(p: Parameter[Any]) -> str:
     name = f"`{p.name}`" + (" *" if p.tunable else "")
     meaning = p.description.replace("|", r"\|")
     return f"| {name} | {_value(p.default)} | {p.unit} | {_range(p)} | {meaning} |"
+
+
+def fault_row(kind: FaultKind) -> str:
+    """The line of a kind of fault."""
+    values = ", ".join(
+        f"`{p.name}` {', '.join(filter(None, (p.unit, _range(p))))}" for p in (v.parameter for v in kind.values)
+    )
+    return f"| {kind.sort}{', all' if kind.whole else ''} | `{kind.name}` | {values} | {kind.description} |"
 
 
 def _value(value: Any) -> str:

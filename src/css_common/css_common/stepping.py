@@ -201,10 +201,15 @@ class Stepper:
         Raises:
             ParameterError: they do not; nothing changes.
         """
-        reason = conflict(type(self.component), {**self.canonical, **changes})
+        reason = self.refusal({**self.canonical, **changes})
         if reason is not None:
             raise ParameterError(reason)
         self.tune(changes)
+
+    def refusal(self, canonical: Mapping[str, Any]) -> str | None:
+        """Why it cannot take values that are each sane: the first thing that is wrong between them, or None."""
+        reason = conflict(type(self.component), canonical)
+        return reason or self.component.untimely(shaped_values(self.component.table(), canonical))
 
     def tune(self, changes: Mapping[str, Any]) -> None:
         """Gives the component new values, which are known to be sane; its state stays."""

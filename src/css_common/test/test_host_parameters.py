@@ -128,11 +128,11 @@ REFUSED: dict[str, list[tuple[Any, str]]] = {
 @pytest.mark.parametrize("bench", ["events"], indirect=True)
 @pytest.mark.parametrize(("name", "value", "reason"), [(n, v, r) for n, rows in REFUSED.items() for v, r in rows])
 def test_bad_values_are_refused_with_the_reason(bench, node, name, value, reason):
-    before = dict(node._canonical)
+    before = dict(node.canonical)
     (result,) = set_parameters(bench, **{name: value})
     assert not result.successful
     assert reason in result.reason
-    assert node._canonical == before
+    assert node.canonical == before
     assert node.component.values.gain == 2.0
 
 
@@ -193,7 +193,7 @@ def overridden(*arguments: str) -> dict[str, Any]:
     mission = mission_from_text(TEXT, "bench.yaml")
     try:
         node = ComponentNode(find_component("testbed", "estimator"), "estimator", mission, context=context)
-        values = dict(node._canonical)
+        values = dict(node.canonical)
         node.destroy_node()
         return values
     finally:

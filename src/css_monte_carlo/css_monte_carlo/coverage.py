@@ -26,8 +26,8 @@ from css_estimation.sun.lit_cells import Gate
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_sim import sun_cells
 from css_sim.cell_errors import nominal_cells
-from css_sim.cell_faults import NO_FAULTS
 from css_sim.cell_screen import cell_sides
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.nodes.css_array import CssArray
 from css_sim.sun_cells import SunCells, sample
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from css_analysis.fault_record import fault_records
 from css_analysis.flight_log import LOGGED_TYPES, FlightLog
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
@@ -20,6 +21,7 @@ from css_common.schema import unknown_name
 from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_monte_carlo.mission_parts import is_attitude
+from css_msgs.msg import Faults
 
 
 def configured(
@@ -78,7 +80,7 @@ def fly_checked(mission: Mission) -> FlightLog:
     """As `fly_directly`, for a mission that has passed the checks before a flight."""
     steps = max(mission.steps, 1)
     wires: dict[str, _Wire | _Tape] = {
-        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=False)
+        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=kind is Faults)
         for topic, kind in mission.topics.items()
     }
     _fly(mission, wires)
@@ -86,6 +88,9 @@ def fly_checked(mission: Mission) -> FlightLog:
     for topic, wire in wires.items():
         if isinstance(wire, _Wire):
             log.add(f"/{topic}", mission.topics[topic], wire.columns())
+    for _, wire in sorted(wires.items()):
+        if isinstance(wire, _Tape):
+            log.faults += fault_records(wire.samples, mission.epoch_ns)
     return log
 
 

@@ -24,6 +24,7 @@ from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
 from css_sim import gyro, magnetometer, tachometer
+from css_sim.actuator_faults import Felt, spoil_actuators
 from css_sim.disturbances import with_dipole
 from css_sim.rigid_body import RigidBody, RotationState, sum_along_axes, wheel_speeds
 from css_sim.sensing import CellsOfCase, Sensors, SensorsOfCase, draw_lags, sense
@@ -71,7 +72,10 @@ class Cases(NamedTuple):
     voltages: np.ndarray  # (C, n) [V]
     rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
-    faults: np.ndarray  # (C, F) of cell_faults.FAULT
+    faults: np.ndarray  # (C, F) of fault_effects.FAULT, of all sensors and actuators
+    felt_wheels: np.ndarray  # (C, N) of rigid_body.WHEEL, room for wheels with faults
+    felt_torque: np.ndarray  # (C, N) [N m] room for what they are then commanded
+    felt_dipole: np.ndarray  # (C, M) [A m^2] the same of the rods
     reflectivity: np.ndarray  # (C, rows, columns), written where clouds move; (0, 0, 0) when the Earth is common
     cloud_fields: np.ndarray  # (C, F, rows, columns) of clouds that move; else (0, 0, 0, 0)
     cloud_motion: np.ndarray  # (C, 3) of `moving_clouds.CloudMotion`
@@ -119,11 +123,16 @@ def fly_block(
         momentum, torque, applied = cases.wheel_momentum[c], cases.torque[c], cases.applied[c]
         speeds, dipole = cases.speeds[c], cases.rod_dipole[c]
         inertia, inverse = mat3(cases.inertia[c]), mat3(cases.inertia_inverse[c])
-        body = RigidBody(inertia, inverse, cases.wheels[c], v.craft.body.substeps)
+        faults, felt = cases.faults[c], Felt(cases.felt_wheels[c], cases.felt_torque[c], cases.felt_dipole[c])
+        # chosen once for a case: flights without faults are as fast as if there were none
+        wheels, felt_torque, felt_dipole = cases.wheels[c], torque, dipole
+        if faults.shape[0] > 0:
+            wheels, felt_torque, felt_dipole = felt
+        body = RigidBody(inertia, inverse, wheels, v.craft.body.substeps)
         disturbances = with_dipole(v.craft.disturbances, row(cases.dipole, c))
         craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipole, v.craft.disturbed)
         key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
-        cells = CellsOfCase(cases.cells[c], cases.faults[c], cases.albedo[c], cases.work[c])
+        cells = CellsOfCase(cases.cells[c], faults, cases.albedo[c], cases.work[c])
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
         field_bias_b = magnetometer.draw_bias(v.sensors.magnetometer, key)
         lags = draw_lags(v.sensors, key)
@@ -147,7 +156,7 @@ def fly_block(
             if read.field_valid:
                 field_b, field_step = read.field_b, step
             wheel_speeds(craft.body, rotation.omega_bn_b, momentum, speeds)
-            tachometer.report(v.tachometer, key, step, speeds)
+            tachometer.report(v.tachometer, faults, key, step, speeds)
             sky = sky_at(around.sky, around.sky_light, k)
             field_is_new = v.heading_hears_field and read.field_valid
             aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
@@ -182,7 +191,9 @@ def fly_block(
             if trace.shape[0] > 0:
                 _note(trace[c, step], rotation, dipole, torque, speeds)
                 note_estimate(tallies, heading, attitude, trace[c, step, TRUTH_COLUMNS:])
-            rotation, _, _ = advance(craft, rotation, momentum, torque, dipole, environment, cycle_s, applied)
+            if faults.shape[0] > 0:
+                spoil_actuators(faults, key, step, cases.wheels[c], torque, dipole, felt)
+            rotation, _, _ = advance(craft, rotation, momentum, felt_torque, felt_dipole, environment, cycle_s, applied)
         for i in range(3):
             cases.rates[c, i] = rotation.omega_bn_b[i]
         after = CaseState(

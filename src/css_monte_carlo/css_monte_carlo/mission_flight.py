@@ -29,6 +29,8 @@ from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables
 from css_sim import (
+    actuator_faults,
+    axis_faults,
     cell_errors,
     cell_faults,
     cell_screen,
@@ -41,6 +43,8 @@ from css_sim import (
     sun_cells,
     tachometer,
 )
+from css_sim.fault_effects import GYRO, MAGNETOMETER
+from css_sim.faults import rows, with_held
 from css_sim.nodes.magnetometer import Magnetometer
 from css_sim.sensing import Sensors
 from css_sim.spacecraft import spacecraft
@@ -130,8 +134,11 @@ class MissionFlight:
         bounds = sorted({0, *(b for b in begins if b < self.steps), self.steps})
         for first, end in pairwise(bounds):
             done = [event for event, begin in zip(self.mission.events, begins, strict=True) if begin <= first]
-            array = self._values_after(self._array, done)
-            yield Stretch(first, end, self._vehicle(done), cases._replace(faults=self._faults(array, cases.numbers)))
+            before = cases
+            cases = cases._replace(faults=self._faults(done, cases.numbers))
+            for now, then in zip(cases.faults, before.faults, strict=True):
+                with_held(now, then, self._begun_anew(done, first))
+            yield Stretch(first, end, self._vehicle(done), cases)
 
     def cases(self, numbers: np.ndarray, guess_deg: float = 0.0) -> tuple[Cases, list[CaseState]]:
         """Tables and initial states of cases (C,).
@@ -180,7 +187,10 @@ class MissionFlight:
             voltages=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
-            faults=self._faults(array, numbers),
+            faults=self._faults([], numbers),
+            felt_wheels=np.stack([body.wheels for body in bodies]),
+            felt_torque=np.zeros_like(momentum),
+            felt_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             reflectivity=earths,
             cloud_fields=fields,
             cloud_motion=motions,
@@ -288,8 +298,31 @@ class MissionFlight:
         plant = self._plant.values
         return self._magnetometer is not None or plant.rods.fitted or initial_conditions.has_dipole(plant)
 
-    def _faults(self, array: Values, numbers: np.ndarray) -> np.ndarray:
-        return np.stack([cell_faults.case_faults(array, self._key(int(number))) for number in numbers])
+    def _faults(self, done: list[Event], numbers: np.ndarray) -> np.ndarray:
+        """The faults (C, F) of cases (C,) once scripted changes have been made."""
+        array, plant = self._values_after(self._array, done), self._values_after(self._plant, done)
+        of_axes = [
+            (self._values_after(sensor, done), sort)
+            for sensor, sort in ((self._gyro, "gyro"), (self._magnetometer, "magnetometer"))
+            if sensor is not None
+        ]
+        return np.stack(
+            [
+                np.concatenate(
+                    [
+                        rows(cell_faults.case_faults(array, key)),
+                        rows(actuator_faults.case_faults(plant, key)),
+                        *(rows(axis_faults.case_faults(values, sort, key)) for values, sort in of_axes),
+                    ]
+                )
+                for key in (self._key(int(number)) for number in numbers)
+            ]
+        )
+
+    def _begun_anew(self, done: list[Event], step: int) -> set[int]:
+        """Sorts of faulty units whose sensor is switched on at a step and knows nothing of before."""
+        sensors = {GYRO: self._gyro, MAGNETOMETER: self._magnetometer}
+        return {sort for sort, sensor in sensors.items() if step > 0 and self._on_since(sensor, done) == step}
 
     def _key(self, case: int) -> RandomKey:
         return random_key(self.mission.values.mission.seed, case)

@@ -13,6 +13,7 @@ from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4
 from css_common.schema import real
 from css_common.vectors import Mat3, Vec3, add, multiply
+from css_sim.fault_effects import GYRO, spoil_axes
 from css_sim.random_walk import random_walk
 from css_sim.three_axes import draw_bias, read_out, reading_variance, with_noise
 
@@ -85,16 +86,18 @@ def bias_at(p: Gyro, errors: GyroErrors, key: RandomKey, step: int) -> Vec3:
 
 
 @kernel
-def read(p: Gyro, errors: GyroErrors, bias_b: Vec3, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
-    """Measured body rate [rad/s] at a control cycle, with the bias of that cycle (`bias_at`)."""
+def read(p: Gyro, errors: GyroErrors, bias_b: Vec3, faults, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle, with the bias of that cycle (`bias_at`) and faults (F,)."""
     rate = with_noise(p.noise, key, Stream.GYRO_NOISE, step, add(multiply(errors.response, omega_bn_b), bias_b))
+    if faults.shape[0] > 0:
+        rate = spoil_axes(faults, GYRO, key, step, rate)
     return read_out(p.resolution, p.range, rate)
 
 
 @kernel
-def measure(p: Gyro, errors: GyroErrors, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
-    """Measured body rate [rad/s] at a control cycle."""
-    return read(p, errors, bias_at(p, errors, key, step), key, step, omega_bn_b)
+def measure(p: Gyro, errors: GyroErrors, faults, key: RandomKey, step: int, omega_bn_b: Vec3) -> Vec3:
+    """Measured body rate [rad/s] at a control cycle; faults (F,) of `fault_effects.FAULT`."""
+    return read(p, errors, bias_at(p, errors, key, step), faults, key, step, omega_bn_b)
 
 
 def variance(p: Gyro) -> float:

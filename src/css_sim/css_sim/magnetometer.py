@@ -10,6 +10,7 @@ from css_common.random_streams import RandomKey, Stream
 from css_common.schema import real
 from css_common.vectors import Vec3, add
 from css_sim import three_axes
+from css_sim.fault_effects import MAGNETOMETER, spoil_axes
 from css_sim.three_axes import read_out, reading_variance, with_noise
 
 NOISE = real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6)
@@ -39,9 +40,11 @@ def draw_bias(p: Magnetometer, key: RandomKey) -> Vec3:
 
 
 @kernel
-def measure(p: Magnetometer, bias_b: Vec3, key: RandomKey, step: int, field_b: Vec3) -> Vec3:
-    """Measured field [T] at a control cycle."""
+def measure(p: Magnetometer, bias_b: Vec3, faults, key: RandomKey, step: int, field_b: Vec3) -> Vec3:
+    """Measured field [T] at a control cycle; faults (F,) of `fault_effects.FAULT`."""
     field_b = with_noise(p.noise, key, Stream.MAGNETOMETER_NOISE, step, add(field_b, bias_b))
+    if faults.shape[0] > 0:
+        field_b = spoil_axes(faults, MAGNETOMETER, key, step, field_b)
     return read_out(p.resolution, p.range, field_b)
 
 

@@ -15,6 +15,7 @@ from css_common.vectors import Mat3, Vec3, multiply
 from css_environment.albedo import albedo_output
 from css_environment.ephemeris import EnvironmentState
 from css_sim import gyro, latency, magnetometer, sun_cells
+from css_sim.fault_effects import GYRO, MAGNETOMETER, is_silent
 from css_sim.gyro import Gyro, GyroErrors
 from css_sim.latency import Latency, Moment, remember, sensed
 from css_sim.magnetometer import Magnetometer
@@ -46,7 +47,7 @@ class CellsOfCase(NamedTuple):
     """The cells of one case, with room for the light of the Earth on them."""
 
     cells: np.ndarray  # (N,) of cell_errors.CELL
-    faults: np.ndarray  # (F,) of cell_faults.FAULT
+    faults: np.ndarray  # (F,) of fault_effects.FAULT, where all sensors are those of their sorts
     albedo: np.ndarray  # (N,) written
     work: np.ndarray  # (224,) of `css_environment.albedo.new_workspace`, written
 
@@ -100,9 +101,9 @@ def sense_cells(
 
 
 @kernel
-def sense_field(p: Magnetometer, bias_b: Vec3, key: RandomKey, step: int, dcm_bn: Mat3, field_n: Vec3) -> Vec3:
+def sense_field(p: Magnetometer, bias_b: Vec3, faults, key: RandomKey, step: int, dcm_bn: Mat3, field_n: Vec3) -> Vec3:
     """Measured field in b [T] of a true field in n [T]."""
-    return magnetometer.measure(p, bias_b, key, step, multiply(dcm_bn, field_n))
+    return magnetometer.measure(p, bias_b, faults, key, step, multiply(dcm_bn, field_n))
 
 
 @kernel
@@ -144,9 +145,13 @@ def sense(
     sense_cells(p.cells, case.cells, case.key, step, dcm_bn, sun_b, intensity, p.earthlit, light, voltages_out)
     bias_b = gyro.bias_at(p.gyro, case.gyro, case.key, step)
     gyro_b, field_b = _NOTHING, _NOTHING
-    if p.gyro_on:
-        gyro_b = gyro.read(p.gyro, case.gyro, bias_b, case.key, step, omega_bn_b)
+    gyro_speaks = p.gyro_on and not is_silent(case.cells.faults, GYRO, step)
+    if gyro_speaks:
+        gyro_b = gyro.read(p.gyro, case.gyro, bias_b, case.cells.faults, case.key, step, omega_bn_b)
     measured = p.field_divider > 0 and p.magnetometer_on and step % p.field_divider == 0
+    measured = measured and not is_silent(case.cells.faults, MAGNETOMETER, step)
     if measured:
-        field_b = sense_field(p.magnetometer, case.field_bias_b, case.key, step, field_dcm_bn, field_n)
-    return Readings(gyro_b, p.gyro_on, field_b, measured, bias_b)
+        field_b = sense_field(
+            p.magnetometer, case.field_bias_b, case.cells.faults, case.key, step, field_dcm_bn, field_n
+        )
+    return Readings(gyro_b, gyro_speaks, field_b, measured, bias_b)

@@ -9,7 +9,7 @@ For each cell, in this order:
     V *= 1 + b^2/2 - 0.65 b^4     warp, with b = sin(arccos(V clipped to [0, 1]))
     V *= 1 - d               degradation, d uniform in [0, d_max), common to all cells or one per cell
     V  = gain V + bias + noise    errors of the individual cell
-    faults                   dead, stuck, noisy
+    faults                   dead, stuck, noisy and others (`fault_kinds`); a shadow acts on the light
     limits and quantisation  [low, high] in 2**bits levels
 
 f is the solar flux relative to 1 AU times the visible fraction of the solar disc, n the true normal of the
@@ -27,7 +27,8 @@ from css_common.vectors import Vec3
 from css_environment.albedo import Screen, transmission
 from css_sensors.cells import half_view_cosine
 from css_sim import cell_screen
-from css_sim.cell_faults import apply_faults
+from css_sim.cell_faults import light_left
+from css_sim.fault_effects import CELL, SHADOWED, any_acts, spoil
 from css_sim.white_noise import add_noise
 
 NOISE = real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0)
@@ -40,7 +41,7 @@ def _levels(bits: int) -> float:
 
 
 class SunCells(NamedTuple):
-    """What all cells have in common in all cases; what differs is in `cell_errors.CELL` and `cell_faults.FAULT`."""
+    """What all cells have in common in all cases; what differs is in `cell_errors.CELL` and `fault_effects.FAULT`."""
 
     screen: Screen = computed(cell_screen.screen)  # what hides part of the sky
     cos_half_view: float = computed(half_view_cosine)
@@ -127,7 +128,7 @@ def sample(
 
     Args:
         cells: (N,) of `cell_errors.CELL`.
-        faults: (F,) of `cell_faults.FAULT`.
+        faults: (F,) of `fault_effects.FAULT`.
         step: number of the control cycle, which with `key` fixes all draws.
         sun_b: unit vector to the Sun.
         intensity: solar flux relative to 1 AU times the visible fraction of the disc [-].
@@ -136,12 +137,15 @@ def sample(
     """
     # the outputs hold the factors until each is used
     _draw_degradation(p, key, step, voltages_out)
+    shadowed = faults.shape[0] > 0 and any_acts(faults, CELL, SHADOWED, step)
     for i in range(voltages_out.shape[0]):
         cell = cells[i]
         v = albedo[i]
         cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
         if cosine >= p.cos_half_view:
             v += intensity * max(0.0, cosine) * transmission(p.screen, cell.side, sun_b)
+        if shadowed:
+            v *= light_left(faults, step, i)
         if v < p.dropout:
             v = 0.0
         if p.warp:
@@ -150,5 +154,5 @@ def sample(
     if p.noise > 0.0:
         add_noise(p.noise, key, Stream.CELL_NOISE, step, voltages_out)
     if faults.shape[0] > 0:
-        apply_faults(faults, key, step, voltages_out)
+        spoil(faults, CELL, key, step, voltages_out)
     return _limit(p, voltages_out)

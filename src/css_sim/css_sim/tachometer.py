@@ -8,6 +8,7 @@ from css_common.declared import builder, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream
 from css_common.schema import real
+from css_sim.fault_effects import TACHOMETER, spoil
 from css_sim.three_axes import read_out_one
 from css_sim.white_noise import add_noise
 
@@ -39,10 +40,16 @@ def errs(p: Tachometer) -> bool:
 
 
 @kernel
-def report(p: Tachometer, key: RandomKey, step: int, speeds) -> None:
-    """Turns the true speeds (N,) [rad/s] of a control cycle into those that are reported."""
+def report(p: Tachometer, faults, key: RandomKey, step: int, speeds) -> None:
+    """Turns the true speeds (N,) [rad/s] of a control cycle into those that are reported.
+
+    Args:
+        faults: (F,) of `fault_effects.FAULT`.
+    """
     if p.noise > 0.0:
         add_noise(p.noise, key, Stream.TACHOMETER, step, speeds)
+    if faults.shape[0] > 0:
+        spoil(faults, TACHOMETER, key, step, speeds)
     if p.resolution > 0.0:
         for i in range(speeds.shape[0]):
             speeds[i] = read_out_one(p.resolution, 0.0, speeds[i])

@@ -9,7 +9,7 @@ import pytest
 from css_common.mission import load_mission
 from css_common.random_streams import Stream, normal4, random_key
 from css_sim import cell_errors, cell_screen, sun_cells
-from css_sim.cell_faults import NO_FAULTS
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.nodes.css_array import CssArray
 
 DROPOUT = math.sin(math.radians(7.0))

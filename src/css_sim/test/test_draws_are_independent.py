@@ -20,7 +20,6 @@ from css_sensors.cells import CELLS
 from css_sensors.slits import SLITS
 from css_sim import (
     cell_errors,
-    cell_faults,
     cell_screen,
     gyro,
     initial_conditions,
@@ -32,6 +31,7 @@ from css_sim import (
     tachometer,
     wheel_friction,
 )
+from css_sim.fault_effects import CELL, FAULT, NO_FAULTS, NOISY
 from css_sim.random_walk import random_walk
 
 CASES = 2000
@@ -64,14 +64,14 @@ def gyro_draws(key):
     yield from (("gyro response", r) for row in errors.response for r in row)
     yield from (("gyro walk", w) for w in random_walk(key, Stream.GYRO_BIAS, 4, 7))
     for step in (0, 1):
-        yield from ((f"gyro noise {step}", n) for n in gyro.measure(quiet, still, key, step, STILL))
+        yield from ((f"gyro noise {step}", n) for n in gyro.measure(quiet, still, NO_FAULTS, key, step, STILL))
 
 
 def magnetometer_draws(key):
     p = magnetometer.parameters(default_values(magnetometer.PARAMETERS, bias_nt=100.0))
     yield from (("field bias", b) for b in magnetometer.draw_bias(p, key))
     for step in (0, 1):
-        yield from ((f"field noise {step}", n) for n in magnetometer.measure(p, STILL, key, step, STILL))
+        yield from ((f"field noise {step}", n) for n in magnetometer.measure(p, STILL, NO_FAULTS, key, step, STILL))
 
 
 def cell_draws(key, nominal):
@@ -87,12 +87,12 @@ def cell_draws(key, nominal):
 def output_draws(key, nominal, quiet):
     """What is drawn at a step: degradation in either mode, noise, and that of a noisy cell."""
     out = np.zeros(CELLS_DRAWN)
-    noisy = np.array([(0, cell_faults.NOISY, 1.0, 0, 9)], cell_faults.FAULT)
+    noisy = np.array([(CELL, 0, NOISY, 0, 1.0, 0.0, 0, 9, 0.0)], FAULT)
     light = np.ones(CELLS_DRAWN)
     variants = (
-        ("loss of all", quiet._replace(degradation=0.5), cell_faults.NO_FAULTS, 1),
-        ("loss", quiet._replace(degradation=0.5, degradation_per_cell=True), cell_faults.NO_FAULTS, CELLS_DRAWN),
-        ("noise", quiet._replace(noise=0.1), cell_faults.NO_FAULTS, CELLS_DRAWN),
+        ("loss of all", quiet._replace(degradation=0.5), NO_FAULTS, 1),
+        ("loss", quiet._replace(degradation=0.5, degradation_per_cell=True), NO_FAULTS, CELLS_DRAWN),
+        ("noise", quiet._replace(noise=0.1), NO_FAULTS, CELLS_DRAWN),
         ("fault", quiet, noisy, 1),
     )
     for step in (0, 1):
@@ -136,7 +136,7 @@ def truth_draws(key, plant, grid):
     yield from (("friction", f) for f in wheel_friction.dispersed_friction(rubbing, key, 4)[0])
     for step in (0, 1):
         speeds = np.zeros(CELLS_DRAWN)
-        tachometer.report(tachometer.Tachometer(1.0, 0.0), key, step, speeds)
+        tachometer.report(tachometer.Tachometer(1.0, 0.0), NO_FAULTS, key, step, speeds)
         yield from ((f"tachometer {step}", s) for s in speeds)
     motion = moving_clouds.draw_motion(key, 3, 0.0, 1.0, 1.0)
     yield from (("motion of clouds", m) for m in (motion.drift, motion.phase))

@@ -10,6 +10,7 @@ from scipy import stats
 from css_common.random_streams import Stream, random_key
 from css_common.schema import default_values
 from css_sim import gyro, magnetometer
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.random_walk import HORIZON, random_walk
 
 SIGNIFICANCE = 1e-4
@@ -33,7 +34,7 @@ def normal(sample, sigma):
 
 def readings(p, steps, rate=STILL, key=KEY):
     errors = gyro.draw_errors(p, key)
-    return np.array([gyro.measure(p, errors, key, step, rate) for step in steps])
+    return np.array([gyro.measure(p, errors, NO_FAULTS, key, step, rate) for step in steps])
 
 
 def test_gyro_bias_is_constant_in_a_case_and_normal_over_cases():
@@ -66,7 +67,7 @@ def test_gyro_scale_and_misalignment_bend_the_rate():
         for j in range(3):
             assert normal(responses[:, i, j], 0.01 if i == j else math.radians(0.5))
     errors = gyro.draw_errors(p, KEY)
-    measured = gyro.measure(p, errors, KEY, 0, RATE)
+    measured = gyro.measure(p, errors, NO_FAULTS, KEY, 0, RATE)
     np.testing.assert_allclose(measured, np.array(errors.response) @ RATE, rtol=1e-14)
 
 
@@ -115,14 +116,16 @@ def test_magnetometer_bias_noise_and_resolution():
     p = magnetometer_parameters(bias_nt=500.0, noise_nt=0.0)
     biases = np.array([magnetometer.draw_bias(p, random_key(1, c)) for c in range(5000)])
     assert all(normal(biases[:, i], 500e-9) for i in range(3))
-    np.testing.assert_allclose(magnetometer.measure(p, biases[3], KEY, 0, field), biases[3] + field, rtol=1e-15)
+    np.testing.assert_allclose(
+        magnetometer.measure(p, biases[3], NO_FAULTS, KEY, 0, field), biases[3] + field, rtol=1e-15
+    )
 
     p = magnetometer_parameters(noise_nt=150.0)
-    noise = np.array([magnetometer.measure(p, STILL, KEY, k, field) for k in range(20_000)]) - field
+    noise = np.array([magnetometer.measure(p, STILL, NO_FAULTS, KEY, k, field) for k in range(20_000)]) - field
     assert all(normal(noise[:, i], 150e-9) for i in range(3))
 
     p = magnetometer_parameters(noise_nt=0.0, resolution_nt=7.0, range_nt=25_000.0)
-    measured = np.array(magnetometer.measure(p, STILL, KEY, 0, field)) * 1e9
+    measured = np.array(magnetometer.measure(p, STILL, NO_FAULTS, KEY, 0, field)) * 1e9
     np.testing.assert_allclose(measured, [21_000.0, -12_999.0, 25_000.0], rtol=1e-12)
     assert magnetometer.variance(p) == pytest.approx(7e-9**2 / 12)
 
@@ -130,5 +133,5 @@ def test_magnetometer_bias_noise_and_resolution():
 def test_sensors_do_not_share_noise():
     g = readings(gyro_parameters(bias_deg_h=0.0), range(5000)) / math.radians(0.01)
     p = magnetometer_parameters(noise_nt=1e6)
-    m = np.array([magnetometer.measure(p, STILL, KEY, k, STILL) for k in range(5000)])
+    m = np.array([magnetometer.measure(p, STILL, NO_FAULTS, KEY, k, STILL) for k in range(5000)])
     assert all(stats.pearsonr(g[:, i], m[:, j]).pvalue > SIGNIFICANCE for i in range(3) for j in range(3))

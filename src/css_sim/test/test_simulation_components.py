@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import codec_of
-from css_common.component import Component
+from css_common.component import Component, all_conflicts
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
@@ -168,7 +168,7 @@ def test_drawn_failures_are_those_of_the_case_and_stay_when_faults_are_set_in_fl
 @pytest.mark.parametrize(
     ("kind", "given", "message"),
     [
-        (CssArray, {"faults": ["9 dead"]}, "expected a cell from 0 to 7"),
+        (CssArray, {"faults": ["9 dead"]}, "expected cell.0 to cell.7"),
         (CssArray, {"random_faults.count": 9}, "random_faults.count: 9 given, expected at most"),
         (CssArray, {"output_low": 1.0, "output_high": 0.5}, "output_low: 1"),
         (CssArray, {"collar.cells": [1]}, "collar.cells"),
@@ -180,4 +180,4 @@ def test_drawn_failures_are_those_of_the_case_and_stay_when_faults_are_set_in_fl
 )
 def test_wrong_values_are_refused_with_their_name(kind, given, message):
     values = okeefe_values(kind.table(), **{name.replace(".", "__"): value for name, value in given.items()})
-    assert any(message in conflict for conflict in kind.conflicts(values))
+    assert any(message in conflict for conflict in all_conflicts(kind, values))

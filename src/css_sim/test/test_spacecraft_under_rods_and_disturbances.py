@@ -20,12 +20,13 @@ IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ENVIRONMENT = EnvironmentState(
     (6.778e6, 1e5, -2e5), (100.0, 5.4e3, 5.4e3), (0.0, 0.6, 0.8), 0.97, 1.0, (1e-5, -2e-5, 3e-5), IDENTITY
 )
+KEY = random_key(1, 0)
 STATE = RotationState((0.1, 0.2, -0.3), (0.02, -0.01, 0.03))
 COMMAND = np.array([0.01, -0.02, 0.005, 0.0])
 
 
 def build(**changes):
-    return spacecraft(okeefe_values(TABLE, **changes), random_key(1, 0))
+    return spacecraft(okeefe_values(TABLE, **changes), KEY)
 
 
 def fly(craft, rods=(), steps=1):

@@ -19,6 +19,7 @@ from css_common.sections import MISSION
 from css_common.vectors import multiply
 from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
+from css_sim.faults import rows
 
 REFERENCE = json.loads((Path(__file__).parent / "data" / "coarse_sun_sensor.json").read_text())
 CASES = [case for case in REFERENCE["cases"] if case["kellyFactor"] == 0.0]
@@ -48,7 +49,7 @@ def outputs(case, faults=()):
     voltage = np.zeros(1)
     key = random_key(1, 0)
     sun_cells.sample(
-        sun_cells.parameters(values), cells, cell_faults.case_faults(values, key), key, 0, sun_b, intensity,
+        sun_cells.parameters(values), cells, rows(cell_faults.case_faults(values, key)), key, 0, sun_b, intensity,
         np.array([case["albedo"]]), voltage,
     )  # fmt: skip
     return voltage[0]

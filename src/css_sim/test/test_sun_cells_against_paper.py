@@ -12,7 +12,7 @@ from css_common.random_streams import random_key
 from css_common.sections import MISSION
 from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_screen, sun_cells
-from css_sim.cell_faults import NO_FAULTS
+from css_sim.fault_effects import NO_FAULTS
 
 KEY = random_key(1, 0)
 PLAIN = {"warp": False, "degradation": 0.0}

@@ -12,6 +12,8 @@ from css_common.random_streams import random_key
 from css_common.sections import MISSION
 from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells
+from css_sim.fault_effects import NO_FAULTS
+from css_sim.faults import rows
 
 fraction = st.floats(0.0, 1.0)
 anything = st.floats(allow_nan=True, allow_infinity=True)
@@ -45,7 +47,7 @@ def set_ups(draw):
     cells = nominal.copy()
     key = random_key(draw(st.integers(0, 99)), 0)
     cell_errors.draw_cells(cell_errors.error_model(values), key, nominal, cells)
-    return sun_cells.parameters(values), cells, cell_faults.case_faults(values, key)
+    return sun_cells.parameters(values), cells, rows(cell_faults.case_faults(values, key))
 
 
 @settings(max_examples=300, deadline=None)
@@ -72,7 +74,7 @@ def test_more_light_never_reads_less(polar, azimuth, intensity, part):
     cells = cell_errors.nominal_cells(values.cells.normals, cell_screen.cell_sides(values))
     sun_b = (math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar))
     bright, dim = np.zeros(8), np.zeros(8)
-    none, key = cell_faults.NO_FAULTS, random_key(1, 0)
+    none, key = NO_FAULTS, random_key(1, 0)
     sun_cells.sample(p, cells, none, key, 3, sun_b, intensity, np.full(8, 0.1), bright)
     sun_cells.sample(p, cells, none, key, 3, sun_b, part * intensity, np.full(8, 0.1), dim)
     assert np.all(bright >= dim)

@@ -11,7 +11,7 @@ from scipy import stats
 from css_common.random_streams import random_key
 from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_screen, sun_cells
-from css_sim.cell_faults import NO_FAULTS
+from css_sim.fault_effects import NO_FAULTS
 
 SIGNIFICANCE = 1e-4
 STEPS = 20_000

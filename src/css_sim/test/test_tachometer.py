@@ -4,6 +4,7 @@
 import numpy as np
 
 from css_common.random_streams import random_key
+from css_sim.fault_effects import NO_FAULTS
 from css_sim.tachometer import Tachometer, report
 
 KEY = random_key(3, 7)
@@ -11,7 +12,7 @@ KEY = random_key(3, 7)
 
 def test_speeds_are_rounded_to_whole_steps():
     speeds = np.array([0.0, 0.4, -0.4, 0.6, -0.6, 123.4])
-    report(Tachometer(0.0, 1.0), KEY, 0, speeds)
+    report(Tachometer(0.0, 1.0), NO_FAULTS, KEY, 0, speeds)
     np.testing.assert_array_equal(speeds, [0.0, 0.0, 0.0, 1.0, -1.0, 123.0])
 
 
@@ -20,7 +21,7 @@ def test_noise_is_white_and_each_wheel_has_its_own():
     rows = []
     for step in range(2000):
         speeds = true.copy()
-        report(Tachometer(0.3, 0.0), KEY, step, speeds)
+        report(Tachometer(0.3, 0.0), NO_FAULTS, KEY, step, speeds)
         rows.append(speeds - true)
     errors = np.array(rows)
     np.testing.assert_allclose(errors.std(axis=0), 0.3, rtol=0.06)

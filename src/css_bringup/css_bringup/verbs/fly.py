@@ -7,6 +7,7 @@ from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
+from css_bringup.faults_flown import faults_flown
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
@@ -32,13 +33,17 @@ def run(arguments: argparse.Namespace) -> int:
 def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     """Prints a flight's result and turns it into an exit code."""
     runs: list[Run] = []
+    faults: list[str] = []
     if result.bag is not None and result.steps > 0:
         try:
-            runs = estimator_runs(read_flight(result.bag))
+            log = read_flight(result.bag)
+            runs, faults = estimator_runs(log), faults_flown(log, result.bag)
         except BagError as error:
             # a recorder that died leaves such a recording, and why it died is the better news
             result.failure = result.failure or str(error)
     print_result(console, result, runs)
+    for line in faults:
+        console.print(f"fault: {line}", soft_wrap=True, highlight=False)
     spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
     for line in spin_lines(spinning) if spinning is not None else ():
         console.print(line, soft_wrap=True)
@@ -48,7 +53,11 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
         complain("criterion missed:", line)
     print_incidents(result)
     if as_json:
-        print_json(flight_object(result, runs) | ({} if spinning is None else {"spin": spin_object(spinning)}))
+        print_json(
+            flight_object(result, runs)
+            | {"faults": faults}
+            | ({} if spinning is None else {"spin": spin_object(spinning)})
+        )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED

@@ -181,17 +181,6 @@ class EarthErrors(NamedTuple):
             high=45.0,
         ),
     )
-    clouded_heading: float = made(
-        lambda degrees: math.radians(degrees) ** 2,
-        real(
-            "albedo.clouded_heading_deg",
-            0.1,
-            "deg",
-            "error of the heading by clouds that last, beyond what the states of the Earth hold, per axis",
-            low=0.0,
-            high=45.0,
-        ),
-    )
 
 
 class Motion(NamedTuple):

@@ -56,7 +56,7 @@ def heading(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3, earth_known
         yz += weight * (0.5 * (c[1][2] + c[2][1]) + off[1] * off[2])
     # what is beyond a bound is cut as a whole, so that it stays a covariance
     cut = min(1.0, LARGEST / max(xx, yy, zz, LARGEST))
-    systematic = across(sun_b, p.earth.clouded_heading if earth_known else p.earth.unknown_heading)
+    systematic = across(sun_b, 0.0 if earth_known else p.earth.unknown_heading)
     return sun_b, (
         cut * xx + systematic[0], cut * xy + systematic[1], cut * xz + systematic[2],
         cut * xy + systematic[1], cut * yy + systematic[4], cut * yz + systematic[5],

@@ -11,8 +11,8 @@ unknown, 3 following several turns about the Sun line (`hypotheses`), 4 tracking
 rate. An estimate that can be no longer trusted (most outputs refused, and another direction explains them better; an
 error larger than a radian; a step longer than `longest_step`) is dropped and the Sun looked for anew.
 
-The covariance is that of the filter and of what lasts too long to be noise: while the Earth is unknown its light
-(`albedo.unknown_heading_deg`), later its clouds (`albedo.clouded_heading_deg`).
+The covariance is that of the filter, and while the Earth is unknown of its light too, which lasts too long to be noise
+(`albedo.unknown_heading_deg`).
 """
 
 import math

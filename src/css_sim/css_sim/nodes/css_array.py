@@ -7,6 +7,7 @@ import numpy as np
 
 from css_common.attitude import mrp_to_dcm
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
+from css_common.fault_lines import Units
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.random_streams import random_key
@@ -22,8 +23,9 @@ from css_environment.ephemeris import segment_start
 from css_environment.moving_clouds import CLOUD_STEP_NS, reflect
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_sensors.cells import LARGEST_READING, NORMALS, SMALLEST_READING
-from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, latency, sun_cells
+from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, failing, latency, sun_cells
 from css_sim.delayed import Delayed
+from css_sim.failing import Failing, fault_outputs
 from css_sim.sensing import CellsOfCase, sense_cells
 from css_sim.sensor_checks import LOUDEST_CELL, noise_findings
 from css_sim.sun_cells import NOISE, OUTPUT_HIGH, OUTPUT_LOW
@@ -33,9 +35,12 @@ class CssArray(Component):
     """Outputs of the coarse sun sensor cells in the light of the Sun and of the Earth (O'Keefe & Schaub 2013)."""
 
     shared = ("cells",)
+    fault_kinds = cell_faults.KINDS
+    _failing = Failing(())  # of a node that has not begun
     parameters = (
         *sun_cells.PARAMETERS,
         *cell_faults.PARAMETERS,
+        failing.REPORT,
         *cell_errors.PARAMETERS,
         *cell_screen.PARAMETERS,
         *earth_reflectivity.PARAMETERS,
@@ -49,7 +54,12 @@ class CssArray(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("voltages", "css/voltages", CssVoltages),)
+        drawn = cell_faults.parameters(values).random.cells > 0
+        return (Output("voltages", "css/voltages", CssVoltages), *fault_outputs(name, values, drawn))
+
+    @classmethod
+    def fault_units(cls, values: Values) -> Units:
+        return cell_faults.units(values)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -80,8 +90,8 @@ class CssArray(Component):
         nominal = cell_errors.nominal_cells(values[NORMALS], cell_screen.cell_sides(values))
         cells = nominal.copy()
         cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, cells)
-        faults = cell_faults.case_faults(values, self._key)
-        self._cells = CellsOfCase(cells, faults, np.zeros(len(cells)), new_workspace())
+        self._failing = Failing(cell_faults.case_faults(values, self._key), self._failing)
+        self._cells = CellsOfCase(cells, self._failing.table, np.zeros(len(cells)), new_workspace())
         grid = earth_reflectivity.source(values, self.epoch_ns)
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
         light = earth_reflectivity.parameters(values)
@@ -101,7 +111,8 @@ class CssArray(Component):
 
     def tune(self, values: Values) -> None:
         super().tune(values)
-        self._cells = self._cells._replace(faults=cell_faults.case_faults(values, self._key))
+        self._failing.take(cell_faults.case_faults(values, self._key))
+        self._cells = self._cells._replace(faults=self._failing.table)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
@@ -137,7 +148,8 @@ class CssArray(Component):
             self._light,
             voltages,
         )
-        return {"voltages": self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)}
+        outputs = self.message("voltages", stamp_ns, saturated=saturated, voltages=voltages)
+        return {"voltages": outputs, **self._failing.told(self, stamp_ns)}
 
     def _move_clouds(self, elapsed_ns: int) -> None:
         if elapsed_ns // CLOUD_STEP_NS != self._cloud_step:

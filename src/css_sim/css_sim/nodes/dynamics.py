@@ -7,7 +7,9 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 
 from css_common.attitude import mrp_to_quaternion
+from css_common.codec import Sample
 from css_common.component import INERTIAL, Finding, Input, Outgoing, Output, Plant, Received
+from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.random_streams import random_key
@@ -26,7 +28,17 @@ from css_common.sections import (
     needed_of_wheels,
 )
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
-from css_sim import disturbances, flight_environment, initial_conditions, orbit_dispersion, tachometer
+from css_sim import (
+    actuator_faults,
+    disturbances,
+    failing,
+    flight_environment,
+    initial_conditions,
+    orbit_dispersion,
+    tachometer,
+)
+from css_sim.actuator_faults import new_felt, spoil_actuators
+from css_sim.failing import Failing, fault_outputs
 from css_sim.flight_checks import check_rate, fastest_start, plant_findings
 from css_sim.rigid_body import wheel_speeds
 from css_sim.spacecraft import advance, spacecraft
@@ -41,12 +53,14 @@ class Dynamics(Plant):
     """Turns the spacecraft under wheels, rods and disturbances along its orbit, and publishes the truth."""
 
     shared = ("orbit", "spacecraft", "wheels", "rods", "lockstep")
+    fault_kinds = actuator_faults.KINDS
     parameters = (
         *initial_conditions.PARAMETERS,
         *orbit_dispersion.PARAMETERS,
         *flight_environment.PARAMETERS,
         *disturbances.PARAMETERS,
         *tachometer.PARAMETERS,
+        *failing.PARAMETERS,
         _SUBSTEPS,
         _POSE,
     )
@@ -77,11 +91,16 @@ class Dynamics(Plant):
         outputs = [Output("truth", "truth", SpacecraftState, frame=INERTIAL)]
         if values[WHEELS_FITTED]:
             outputs.append(Output("wheels", "wheels/state", WheelState))
-            if tachometer.errs(tachometer.parameters(values)):
+            if _speeds_err(values):
                 outputs.append(Output("true_wheels", "truth/wheels", WheelState))
         if values[_POSE]:
             outputs.append(Output("pose", "truth/pose", PoseStamped, frame=INERTIAL))
+        outputs += fault_outputs(name, values)
         return tuple(outputs)
+
+    @classmethod
+    def fault_units(cls, values: Values) -> Units:
+        return actuator_faults.units(values)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -105,6 +124,8 @@ class Dynamics(Plant):
         values = self.values
         self._key = key = random_key(values[SEED], values[CASE])
         self._craft = spacecraft(values, key, values[_SUBSTEPS])
+        self._failing = Failing(actuator_faults.case_faults(values, key))
+        self._take_faults()
         self._environment = flight_environment.flight_environment(
             values, orbit=orbit_dispersion.case_orbit(values, key)
         )
@@ -117,21 +138,47 @@ class Dynamics(Plant):
         self._torque = np.zeros(len(self._momentum))
         self._tachometer = tachometer.parameters(values)
         self._advance, self._wheel_speeds = typed_call(advance), typed_call(wheel_speeds)
+        self._spoil = typed_call(spoil_actuators)
+        # compiled before the flight: faults may be injected into it
+        wheels, torque, dipole = self._craft.body.wheels, self._wheels_at_rest, self._rods_at_rest
+        self._spoil(self._failing.table[:0], key, 0, wheels, torque, dipole, self._felt)
         self._report = typed_call(tachometer.report)
         self._steps = round(values[DURATION] / values[PERIOD])
         self.finished = False
+
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._failing.take(actuator_faults.case_faults(values, self._key))
+        self._take_faults()
+
+    def untimely(self, values: Values) -> str | None:
+        if _tachometers_fail(values) and "true_wheels" not in self.frames:
+            return "faults: nobody tells the true speeds on truth/wheels, expected report_faults: true from the start"
+        return None
+
+    def _take_faults(self) -> None:
+        body = self._craft.body
+        self._felt = new_felt(body.wheels, len(self._craft.rod_axes_b))
+        self._faulty = self._craft._replace(body=body._replace(wheels=self._felt.wheels))
 
     def begin(self) -> Outgoing:
         return self._messages(self.epoch_ns, 0, 0)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         wheels, rods = received.get("wheels"), received.get("rods")
+        craft = self._craft
+        torque = self._wheels_at_rest if wheels is None else wheels.torque
+        dipole = self._rods_at_rest if rods is None else rods.dipole
+        if len(self._failing.table):
+            step, felt = self.step_of(stamp_ns), self._felt
+            self._spoil(self._failing.table, self._key, step, craft.body.wheels, torque, dipole, felt)
+            craft, torque, dipole = self._faulty, felt.torque, felt.dipole
         self._state, torque_limited, speed_limited = self._advance(
-            self._craft,
+            craft,
             self._state,
             self._momentum,
-            self._wheels_at_rest if wheels is None else wheels.torque,
-            self._rods_at_rest if rods is None else rods.dipole,
+            torque,
+            dipole,
             self._surroundings,
             self.period_ns * 1e-9,
             self._torque,
@@ -145,7 +192,7 @@ class Dynamics(Plant):
         # kept, because the cycle that begins at this stamp needs it too
         self._surroundings = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
         state, surroundings = self._state, self._surroundings
-        messages = {
+        messages: dict[str, Sample] = {
             "truth": self.message(
                 "truth",
                 stamp_ns,
@@ -167,16 +214,25 @@ class Dynamics(Plant):
                 "torque_limited": torque_limited,
                 "torque": self._torque.copy(),
             }
-            if tachometer.errs(self._tachometer):
+            if "true_wheels" in self.frames:
                 messages["true_wheels"] = self.message("true_wheels", stamp_ns, speed=speed.copy(), **wheels)
-                self._report(self._tachometer, self._key, self.step_of(stamp_ns), speed)
+            self._report(self._tachometer, self._failing.table, self._key, self.step_of(stamp_ns), speed)
             messages["wheels"] = self.message("wheels", stamp_ns, speed=speed, **wheels)
         if self.values[_POSE]:
             # the quaternion that turns components in b into components in n, as ROS has it, is scalar-last that of
             # dcm_bn in the convention of css_common.attitude
             pose = np.array((*surroundings.r_n, *mrp_to_quaternion(state.sigma_bn)))
             messages["pose"] = self.message("pose", stamp_ns, pose=pose)
-        return messages
+        return messages | self._failing.told(self, stamp_ns)
+
+
+def _speeds_err(values: Values) -> bool:
+    """Whether reported speeds may be other than the true ones."""
+    return tachometer.errs(tachometer.parameters(values)) or values[failing.REPORT] or _tachometers_fail(values)
+
+
+def _tachometers_fail(values: Values) -> bool:
+    return any(line.startswith("tachometer.") for line in values[FAULTS])
 
 
 main = node_main(Dynamics)

@@ -6,7 +6,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from sensor_msgs.msg import Imu
 
+from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
+from css_common.fault_lines import Units
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.random_streams import random_key
@@ -15,8 +17,11 @@ from css_common.schema import Values
 from css_common.sections import CASE, SEED
 from css_common.vectors import vector_of
 from css_msgs.msg import SpacecraftState
-from css_sim import gyro, latency
+from css_sim import axis_faults, failing, gyro, latency
 from css_sim.delayed import Delayed
+from css_sim.failing import Failing, fault_outputs
+from css_sim.fault_effects import GYRO, is_silent
+from css_sim.faults import CaseFault
 from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -28,7 +33,9 @@ class Gyro(Component):
     """Body rates with bias and noise. Deactivated, it says for every stamp that it has no estimate (covariance -1)."""
 
     shared = ()
-    parameters = (*gyro.PARAMETERS, *latency.PARAMETERS)
+    parameters = (*gyro.PARAMETERS, *latency.PARAMETERS, *failing.PARAMETERS)
+    fault_kinds = axis_faults.GYRO_KINDS
+    _failing = Failing(())  # of a node that has not begun
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -36,7 +43,11 @@ class Gyro(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("imu", "gyro/imu", Imu),)
+        return (Output("imu", "gyro/imu", Imu), *fault_outputs(name, values))
+
+    @classmethod
+    def fault_units(cls, values: Values) -> Units:
+        return axis_faults.units("gyro")
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
@@ -48,22 +59,33 @@ class Gyro(Component):
 
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
+        self._failing = Failing(self._case_faults(), self._failing)
         self._p = gyro.parameters(self.values)
         self._errors = gyro.draw_errors(self._p, self._key)
         self._measure = typed_call(gyro.measure)
         self._delayed = Delayed(latency.parameters(self.values), self._key, latency.GYRO)
         self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._failing.take(self._case_faults())
+
+    def _case_faults(self) -> list[CaseFault]:
+        return axis_faults.case_faults(self.values, "gyro", self._key)
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         step = self.step_of(stamp_ns)
         omega_bn_b = self._delayed(step, omega_bn_b=vector_of(received["truth"].omega_bn_b)).omega_bn_b
-        rate = self._measure(self._p, self._errors, self._key, step, omega_bn_b)
-        return self._imu(stamp_ns, np.array(rate), self._covariance)
+        told = self._failing.told(self, stamp_ns)
+        if is_silent(self._failing.table, GYRO, step):
+            return self._imu(stamp_ns, _ZERO, _NOTHING) | told
+        rate = self._measure(self._p, self._errors, self._failing.table, self._key, step, omega_bn_b)
+        return self._imu(stamp_ns, np.array(rate), self._covariance) | told
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
-        return self._imu(stamp_ns, _ZERO, _NOTHING)
+        return self._imu(stamp_ns, _ZERO, _NOTHING) | self._failing.told(self, stamp_ns)
 
-    def _imu(self, stamp_ns: int, rate: np.ndarray, covariance: np.ndarray) -> Outgoing:
+    def _imu(self, stamp_ns: int, rate: np.ndarray, covariance: np.ndarray) -> dict[str, Sample]:
         imu = self.message(
             "imu",
             stamp_ns,

@@ -9,6 +9,7 @@ from sensor_msgs.msg import MagneticField
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
+from css_common.fault_lines import Units
 from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
@@ -16,8 +17,11 @@ from css_common.schema import Values
 from css_common.sections import CASE, FIELD_DIVIDER, SEED
 from css_common.vectors import vector_of
 from css_msgs.msg import SpacecraftState
-from css_sim import latency, magnetometer
+from css_sim import axis_faults, failing, latency, magnetometer
 from css_sim.delayed import Delayed
+from css_sim.failing import Failing, fault_outputs
+from css_sim.fault_effects import MAGNETOMETER, is_silent
+from css_sim.faults import CaseFault
 from css_sim.latency import Moment
 from css_sim.sensing import sense_field
 from css_sim.sensor_checks import LOUDEST_FIELD_NT, noise_findings
@@ -32,7 +36,9 @@ class Magnetometer(Component):
     """
 
     shared = ("magnetometer",)
-    parameters = (*magnetometer.PARAMETERS, *latency.PARAMETERS)
+    parameters = (*magnetometer.PARAMETERS, *latency.PARAMETERS, *failing.PARAMETERS)
+    fault_kinds = axis_faults.MAGNETOMETER_KINDS
+    _failing = Failing(())  # of a node that has not begun
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -40,7 +46,14 @@ class Magnetometer(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("field", "mag/field", MagneticField, divider=values[FIELD_DIVIDER]),)
+        return (
+            Output("field", "mag/field", MagneticField, divider=values[FIELD_DIVIDER]),
+            *fault_outputs(name, values),
+        )
+
+    @classmethod
+    def fault_units(cls, values: Values) -> Units:
+        return axis_faults.units("magnetometer")
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
@@ -52,29 +65,43 @@ class Magnetometer(Component):
 
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
+        self._failing = Failing(self._case_faults(), self._failing)
         self._p = magnetometer.parameters(self.values)
         self._bias_b = magnetometer.draw_bias(self._p, self._key)
         self._delayed = Delayed(latency.parameters(self.values), self._key, latency.MAGNETOMETER)
         self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._failing.take(self._case_faults())
+
+    def _case_faults(self) -> list[CaseFault]:
+        return axis_faults.case_faults(self.values, "magnetometer", self._key)
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         step = self.step_of(stamp_ns)
         there = self._there(step, received["truth"])
+        told = self._failing.told(self, stamp_ns)
         if not self._is_due(step):
-            return {}
-        measured = sense_field(self._p, self._bias_b, self._key, step, mrp_to_dcm(there.sigma_bn), there.field_n)
-        return self._field(stamp_ns, np.array(measured), self._covariance)
+            return told
+        faults = self._failing.table
+        if is_silent(faults, MAGNETOMETER, step):
+            return self._field(stamp_ns, np.zeros(3), _NOTHING) | told
+        dcm_bn = mrp_to_dcm(there.sigma_bn)
+        measured = sense_field(self._p, self._bias_b, faults, self._key, step, dcm_bn, there.field_n)
+        return self._field(stamp_ns, np.array(measured), self._covariance) | told
 
     def _there(self, step: int, truth: Sample) -> Moment:
         return self._delayed(step, sigma_bn=vector_of(truth.sigma_bn), field_n=vector_of(truth.field_n))
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
-        return self._field(stamp_ns, np.zeros(3), _NOTHING) if self._is_due(self.step_of(stamp_ns)) else {}
+        told = self._failing.told(self, stamp_ns)
+        return self._field(stamp_ns, np.zeros(3), _NOTHING) | told if self._is_due(self.step_of(stamp_ns)) else told
 
     def _is_due(self, step: int) -> bool:
         return step % self.values[FIELD_DIVIDER] == 0
 
-    def _field(self, stamp_ns: int, field_b: np.ndarray, covariance: np.ndarray) -> Outgoing:
+    def _field(self, stamp_ns: int, field_b: np.ndarray, covariance: np.ndarray) -> dict[str, Sample]:
         return {"field": self.message("field", stamp_ns, magnetic_field=field_b, magnetic_field_covariance=covariance)}
 
 

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Faults of sensors of three axes: gyro and magnetometer."""
+
+from css_common.fault_lines import FAULTS, Units
+from css_common.random_streams import RandomKey
+from css_common.schema import Values
+from css_common.sections import PERIOD
+from css_sim import faults
+from css_sim.fault_kinds import AXES, kinds_of
+from css_sim.faults import CaseFault
+
+GYRO_KINDS = kinds_of("gyro")
+MAGNETOMETER_KINDS = kinds_of("magnetometer")
+
+
+def units(sort: str) -> Units:
+    """The axes that may fail."""
+    return {sort: AXES}
+
+
+def case_faults(values: Values, sort: str, key: RandomKey) -> list[CaseFault]:
+    """Faults of one case of a `gyro` or a `magnetometer`."""
+    return faults.case_faults(values[FAULTS], kinds_of(sort), units(sort), key, values[PERIOD])

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a node with faulty units has besides: its faults as kernels take them, and a topic that tells which act."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from css_common.codec import Sample
+from css_common.component import Component, Output
+from css_common.fault_lines import FAULTS
+from css_common.schema import Table, Values, flag
+from css_msgs.msg import Faults
+from css_sim.fault_effects import NEVER, NO_FAULTS
+from css_sim.faults import CaseFault, rows, with_held
+
+REPORT = flag("report_faults", False, "tell which faults act even if none is given before the flight")
+PARAMETERS: Table = (FAULTS, REPORT)
+
+_KEY = "faults"
+
+
+def fault_outputs(name: str, values: Values, drawn: bool = False) -> tuple[Output, ...]:
+    """The topic on which a node tells its faults; none where none are given, or `drawn` besides."""
+    told = bool(values[FAULTS]) or values[REPORT] or drawn
+    return (Output(_KEY, f"faults/{name}", Faults, events=True),) if told else ()
+
+
+class Failing:
+    """The faults of a node.
+
+    Attributes:
+        table: (F,) of `fault_effects.FAULT`.
+    """
+
+    _told: tuple[CaseFault, ...] | None  # those of the last message; None: nobody has told any yet
+
+    def __init__(self, faults: Sequence[CaseFault], before: "Failing | None" = None) -> None:
+        """Faults from the first step on, or for a node that begins anew after those that it told `before`."""
+        self._faults: Sequence[CaseFault] = ()
+        self._told = before._told if before is not None else None
+        self.table = NO_FAULTS
+        self.take(faults)
+
+    def take(self, faults: Sequence[CaseFault]) -> None:
+        """Has other faults from now on; a frozen unit that stays frozen stays where it is."""
+        self._faults = faults
+        self.table = with_held(rows(faults), self.table)
+
+    def told(self, component: Component, stamp_ns: int) -> dict[str, Sample]:
+        """A message of the faults that act at a stamp, if they are others than those of the last message."""
+        if _KEY not in component.frames or not (self._faults or self._told or self._told is None):
+            return {}
+        step = component.step_of(stamp_ns)
+        if self._told is None and step == 0:
+            self._told = ()
+        # one that begins later, restarted perhaps, may follow messages that are true no more
+        acting = tuple(fault for fault in self._faults if fault.first_step <= step < fault.end_step)
+        if acting == self._told:
+            return {}
+        self._told = acting
+        period = component.period_ns * 1e-9
+
+        def column(name: str) -> np.ndarray:
+            return np.array([getattr(fault, name) for fault in acting], np.uint32)
+
+        values = [(*fault.values, 0.0, 0.0)[:2] for fault in acting]
+        return {
+            _KEY: component.message(
+                _KEY,
+                stamp_ns,
+                sort=column("sort"),
+                unit=column("unit"),
+                kind=column("kind"),
+                value=np.array([value for value, _ in values]),
+                second=np.array([second for _, second in values]),
+                begin=np.array([fault.first_step * period for fault in acting]),
+                end=np.array([fault.end_step * period if fault.end_step < NEVER else -1.0 for fault in acting]),
+            )
+        }
