@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from css_analysis.flight_log import FlightLog
-from css_analysis.message_columns import Columns
 from css_common.codec import codec_of
 from css_common.epochs import parse_utc
+from css_common.message_columns import Columns
 from css_msgs.msg import SpacecraftState, SunEstimate
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter

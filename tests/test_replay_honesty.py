@@ -3,61 +3,25 @@
 
 import json
 import random
-from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from flights import messages_by_topic
+from rewritten_bag import REFERENCE, edited, on, rewritten
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from sensor_msgs.msg import Imu
 
 from css_bringup.commands import replay as command
-from css_common.codec import Codec, Sample, codec_of
+from css_common.codec import Sample
 from css_msgs.msg import CssVoltages, SunEstimate
-from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
-from css_recording.bag_writer import BagWriter
 from css_recording.provenance import software_versions
 from css_recording.schemas import schema_of
 
-REFERENCE = Path(__file__).parents[1] / "bags" / "reference"
 SECOND = 1_000_000_000
 ESTIMATES = 1500
-Change = Callable[[str, int, bytes], Iterable[tuple[int, bytes]]]
-
-
-def rewritten(folder: Path, change: Change, types: dict[str, str] | None = None, **description: str) -> Path:
-    """The reference recording with each message replaced by those that `change` gives for it."""
-    with BagReader(REFERENCE) as reader, BagWriter(folder, metadata=reader.description | description) as writer:
-        for entry in reader.topics:
-            writer.add_topic(Topic(entry.topic.name, (types or {}).get(entry.topic.name, entry.topic.type)))
-        for message in reader.messages():
-            for stamp_ns, data in change(message.topic, message.stamp_ns, message.data):
-                writer.write(message.topic, stamp_ns, data)
-    return folder
-
-
-def on(topic: str, act: Callable[[int, bytes], bytes | None]) -> Change:
-    """A change of one topic: `act` gives the new bytes of a message, None drops it."""
-
-    def change(of: str, stamp_ns: int, data: bytes) -> Iterable[tuple[int, bytes]]:
-        changed = act(stamp_ns, data) if of == topic else data
-        return [] if changed is None else [(stamp_ns, changed)]
-
-    return change
-
-
-def edited(message_type: type, edit: Callable[[Sample], object]) -> Callable[[int, bytes], bytes]:
-    codec: Codec = codec_of(message_type)
-
-    def act(stamp_ns: int, data: bytes) -> bytes:
-        sample = codec.decode(data)
-        edit(sample)
-        return codec.encode(sample)
-
-    return act
 
 
 def untouched(stamp_ns: int, data: bytes) -> bytes:

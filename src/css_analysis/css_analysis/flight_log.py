@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from css_analysis.fault_record import FaultRecord, fault_records
-from css_analysis.message_columns import Columns, stack
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Codec, DecodeError, Sample, codec_of, type_name
 from css_common.kernel import kernel
+from css_common.message_columns import Columns, stack
 from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
 from css_common.vectors import multiply, row

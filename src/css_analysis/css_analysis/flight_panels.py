@@ -20,7 +20,7 @@ from css_analysis.figure_style import (
     shade_dark,
 )
 from css_analysis.flight_log import FlightLog
-from css_analysis.message_columns import Columns
+from css_common.message_columns import Columns
 from css_msgs.msg import ControlStatus, SunEstimate
 
 _RPM = 60.0 / (2.0 * np.pi)

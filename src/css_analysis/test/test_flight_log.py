@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 from synthetic_flight import EPOCH_NS, columns, estimates, record, stamps, tilted, truth
 
 from css_analysis.flight_log import angle, estimator_of, read_flight, to_body
-from css_analysis.message_columns import Columns, columns_of, stack
 from css_common.codec import DecodeError, codec_of
+from css_common.message_columns import Columns, columns_of, stack, stack_alike, unstack
 from css_common.mission import load_mission
 from css_msgs.msg import ControlStatus, CssVoltages, SpacecraftState, SunEstimate, WheelState
 from css_recording.bag_metadata import Topic
@@ -54,6 +54,25 @@ def test_the_stacked_view_equals_decoding_each_message(rng, message_type, frame)
     ]
     assert_equal(stack(codec, data), written)
     assert_equal(columns_of(codec, [codec.decode(d) for d in data]), written)
+    assert unstack(codec, frame, written) == data
+
+
+def test_a_number_that_the_type_does_not_hold_is_refused():
+    many = columns(SunEstimate, stamps(3))
+    vars(many)["mode"] = np.array([0, 1, 256])
+    with pytest.raises(ValueError, match=r"SunEstimate.mode: a number given that uint8 does not hold"):
+        unstack(codec_of(SunEstimate), "bus", many)
+    vars(many)["mode"] = np.zeros((3, 2), np.uint8)
+    with pytest.raises(ValueError, match=r"SunEstimate.mode: rows of \(2,\) given, expected \(\)"):
+        unstack(codec_of(SunEstimate), "bus", many)
+
+
+def test_messages_of_two_frames_are_not_alike():
+    codec = codec_of(CssVoltages)
+    messages = [codec.encode(codec.sample(EPOCH_NS, frame, voltages=np.ones(2))) for frame in ("bus", "eci")]
+    assert stack_alike(codec, messages) is None
+    first = stack_alike(codec, messages[:1])
+    assert first is not None and first.frame_id == "bus"
 
 
 def test_messages_of_different_length_are_padded():

@@ -10,7 +10,7 @@ from rclpy.executors import ExternalShutdownException
 
 from css_bringup.flight_result import FlightResult, Progress, Stopped, as_flown
 from css_bringup.incidents import node_incidents
-from css_common.executor import create_executor, retire, spin_until
+from css_common.executor import create_executor, retire, spin_about_until, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
@@ -106,7 +106,7 @@ class ComposedFlight:
                 return plant.done or stopped() or (recorder is not None and bool(recorder.failure))
 
             # until the first step is out, partners are being matched: not part of the flight's time
-            self._spin(lambda: plant.begun or over(), None)
+            spin_until(self.executor, lambda: plant.begun or over(), context=self.context)
             gc.collect()
             gc.freeze()
             wall, cpu = time.perf_counter(), time.process_time()
@@ -150,7 +150,7 @@ class ComposedFlight:
 
     def _spin(self, done, progress: Progress | None) -> None:
         if progress is None:
-            spin_until(self.executor, done, context=self.context)
+            spin_about_until(self.executor, done, self.plant)
             return
         epoch, plant = self.mission.epoch_ns, self.plant
         due = 0.0
@@ -163,4 +163,4 @@ class ComposedFlight:
                 progress((plant.stamp_ns - epoch) * 1e-9 if plant.begun else 0.0)
             return done()
 
-        spin_until(self.executor, done_with_progress, context=self.context)
+        spin_about_until(self.executor, done_with_progress, self.plant)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest, parse_request
 from css_bringup.flight_changes import PARAMETER_EVENTS, RecordedSetting, read_setting
+from css_bringup.replay_stretch import Stretch, stretches
 from css_bringup.replayed import Replayed, replayed
 from css_common.codec import DecodeError, Sample, codec_of, stamp_of, type_name
 from css_common.component import Input
@@ -18,10 +19,14 @@ from css_common.edge import Edge
 from css_common.mission import Mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_recording.bag_metadata import Topic, absolute
-from css_recording.bag_reader import BagReader
+from css_recording.bag_reader import BagMessage, BagReader
 from css_recording.bag_writer import BagWriter
 
 __all__ = ["EstimatorRequest", "Replay", "parse_request"]
+
+
+LONG = 10_000
+"""Messages of an input from which on it is worth loading the loops that take many at once."""
 
 
 class Replay:
@@ -31,6 +36,7 @@ class Replay:
         reader: the recording.
         runs: one entry an estimator.
         reports: one line for each kind of refusal and failure.
+        long_from: messages of an input from which on ordinary parts of the recording are taken at once.
         first_ns, last_ns: earliest and latest stamp of the messages that the estimators took; zeros: none.
     """
 
@@ -57,6 +63,8 @@ class Replay:
         self.reports: list[str] = []
         self.runs: list[Replayed] = []
         self.first_ns = self.last_ns = 0
+        self.long_from = LONG
+        self._counts = {entry.topic.name: entry.count for entry in reader.topics}
         self._recorded = {entry.topic.name: entry.topic.type for entry in reader.topics if entry.count}
         self._listeners: dict[str, list[tuple[Edge, list[Replayed]]]] = {}
         text = reader.mission_text
@@ -107,7 +115,42 @@ class Replay:
         if writer is not None:
             self._announce(writer, copied)
         started = time.process_time()
-        for message in self.reader.messages({*self._listeners, *copied} & self._recorded.keys()):
+        messages = self.reader.messages({*self._listeners, *copied} & self._recorded.keys())
+        for part in stretches(messages) if self._is_long else ():
+            if not self._leap(part, writer, copied):
+                self._walk(part, writer, copied)
+        self._walk(messages, writer, copied)
+        for run in self.runs:
+            run.finish()
+        return time.process_time() - started
+
+    @property
+    def _is_long(self) -> bool:
+        return any(self._counts.get(topic, 0) >= self.long_from for topic in self._listeners)
+
+    def _leap(self, part: list[BagMessage], writer: BagWriter | None, copied: frozenset[str]) -> bool:
+        """Takes an ordinary part of the recording at once; False: nothing of it is taken, as it is none."""
+        stretch = Stretch.of(part, self._listeners, self.runs)
+        if stretch is None:
+            return False
+        for first_ns, last_ns in stretch.spans():
+            self._note_stamp(first_ns)
+            self._note_stamp(last_ns)
+        given = stretch.take()
+        if writer is not None:
+            waiting = iter(given)
+            message = next(waiting, None)
+            for place, read in enumerate(part):
+                if read.topic in copied:
+                    writer.write(read.topic, _header_stamp(read.data, read.stamp_ns), read.data)
+                while message is not None and message.place == place:
+                    writer.write(message.topic, message.stamp_ns, message.data)
+                    message = next(waiting, None)
+        return True
+
+    def _walk(self, messages: Iterable[BagMessage], writer: BagWriter | None, copied: frozenset[str]) -> None:
+        """Takes messages one by one."""
+        for message in messages:
             if writer is not None and message.topic in copied:
                 writer.write(message.topic, _header_stamp(message.data, message.stamp_ns), message.data)
             for edge, runs in self._listeners.get(message.topic, ()):
@@ -118,9 +161,6 @@ class Replay:
                 for run in runs:
                     for stamp_ns, received in run.matcher.offer(edge.source.key, sample):
                         self._step(run, stamp_ns, received, writer)
-        for run in self.runs:
-            run.finish()
-        return time.process_time() - started
 
     def _step(
         self, run: Replayed, stamp_ns: int, received: Mapping[str, Sample | None], writer: BagWriter | None

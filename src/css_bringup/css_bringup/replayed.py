@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """One estimator in a replay: from which node of the flight it comes, what is changed in it, what it gave."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -9,7 +9,7 @@ from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest
 from css_bringup.flight_changes import ParameterChange, RecordedSetting, settings_in_flight
 from css_bringup.retracing import Given, Retrace
-from css_common.component import Input, Output
+from css_common.component import Cycles, Input, Output, Received
 from css_common.matching import Matcher
 from css_common.mission import Event, Mission, Node, find_component
 from css_common.mission_file import MissionError
@@ -97,6 +97,31 @@ class Replayed:
             for _, sample, data in given:
                 self.comparison.add(sample.stamp_ns, data)
         return given
+
+    def is_quiet(self, stamp_ns: int) -> bool:
+        """Nothing happens to it up to a stamp, as far as is known."""
+        return self.retrace.is_quiet(stamp_ns)
+
+    def steps(self, cycles: Cycles, received: Callable[[int], Received]) -> Iterator[tuple[int, str, int, bytes]]:
+        """The messages of many quiet steps, at once or one by one: number of the step, topic, stamp and message.
+
+        Args:
+            cycles: the steps.
+            received: inputs of one of them.
+        """
+        given = self.retrace.steps(cycles, received)
+        if given is None:
+            for step, stamp_ns in enumerate(cycles.stamps_ns.tolist()):
+                for port, sample, data in self.step(stamp_ns, received(step)):
+                    yield step, self.topics[port.key], sample.stamp_ns, data
+            return
+        for port, messages in given:
+            self.messages += len(messages)
+            topic = self.topics[port.key]
+            for step, (stamp_ns, data) in enumerate(messages):
+                if self.comparison is not None:
+                    self.comparison.add(stamp_ns, data)
+                yield step, topic, stamp_ns, data
 
     def finish(self) -> None:
         """Closes the books at the end of the recording."""

@@ -10,10 +10,12 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from css_bringup.comparison import Comparison
 from css_bringup.flight_changes import ParameterChange
 from css_common.codec import Sample
-from css_common.component import Received
+from css_common.component import Cycles, Received
 from css_common.schema import ParameterError
 from css_common.stepping import Port, Stepper
 
@@ -68,6 +70,7 @@ class Retrace:
         self._recent: deque[_Step] = deque(maxlen=_RECENT)
         self._agreed = False
         self._futile = 0
+        self._one_by_one = 0
         self._searched = False
         reach = max(_WINDOW_NS, _WINDOW_STEPS * stepper.component.period_ns)
         self._reach_ns = reach if comparison is not None else 0
@@ -91,6 +94,55 @@ class Retrace:
         elif agrees:
             self._agreed = True
         return given
+
+    def is_quiet(self, stamp_ns: int) -> bool:
+        """No event and no change of parameters is due or looked for up to a stamp."""
+        changes = self._changes
+        return self.stepper.is_quiet(stamp_ns) and not (changes and stamp_ns >= changes[0].stamp_ns - self._reach_ns)
+
+    def steps(
+        self, cycles: Cycles, received: Callable[[int], Received]
+    ) -> list[tuple[Port, list[tuple[int, bytes]]]] | None:
+        """The messages of many quiet steps, stamp and bytes of each by output; None: they are to be made one by one.
+
+        They are where the component does not offer it, where one fails, and where what flew was something else.
+        """
+        stepper = self.stepper
+        if not stepper.offers_steps or self._one_by_one >= _MOST_FUTILE:
+            return None
+        before = stepper.snapshot()
+        try:
+            given = stepper.steps(cycles)
+        except Exception:  # told of at the step that raises it
+            given = None
+        if given is None or not self._note_agreement(cycles, given, received):
+            self._one_by_one += 1
+            stepper.restore(before)
+            return None
+        self._one_by_one = 0
+        return given
+
+    def _note_agreement(
+        self,
+        cycles: Cycles,
+        given: list[tuple[Port, list[tuple[int, bytes]]]],
+        received: Callable[[int], Received],
+    ) -> bool:
+        """Whether messages are as they flew, where they did; then the last of them are remembered."""
+        comparison = self._comparison
+        if comparison is None:
+            return True
+        flew = np.zeros(len(cycles.stamps_ns), np.bool_)
+        for _, messages in given:
+            flown = [comparison.expected(stamp_ns) for stamp_ns, _ in messages]
+            if any(known is not None and known != data for known, (_, data) in zip(flown, messages, strict=True)):
+                return False
+            flew |= [known is not None for known in flown]
+        self._agreed = self._agreed or bool(np.any(flew))
+        for step in range(len(flew))[-_RECENT:]:
+            of_step = [messages[step][1] for _, messages in given] if flew[step] else None
+            self._recent.append(_Step(int(cycles.stamps_ns[step]), received(step), None, of_step))
+        return True
 
     def finish(self) -> None:
         """Says what was never found."""

@@ -20,7 +20,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 
-_ENCAPSULATION = b"\x00\x01\x00\x00"  # XCDR1, little endian
+ENCAPSULATION = b"\x00\x01\x00\x00"  # XCDR1, little endian
 _SHIFT = bytes(4)
 _HEADER = struct.Struct("<iII")
 _U32 = struct.Struct("<I")
@@ -31,6 +31,7 @@ _SCALARS = {
 }  # fmt: skip
 MAX_FRAME = 256
 MAX_ELEMENTS = 1 << 20
+_MOST_LAYOUTS = 64
 
 
 class DecodeError(ValueError):
@@ -91,6 +92,7 @@ class Codec:
         slots = message_type.SLOT_TYPES[1:]
         self.fields = [self._field(name, slot) for name, slot in zip(names[1:], slots, strict=True)]
         self._real_fields = [field for field in self.fields if field.code in "df"]
+        self._layouts: dict[tuple[int, ...], struct.Struct] = {}
 
     def _field(self, name: str, slot: Any) -> _Field:
         kind = type(slot).__name__
@@ -110,7 +112,7 @@ class Codec:
         Raises:
             DecodeError: the bytes are too short, too long or not little-endian CDR.
         """
-        if data[:4] != _ENCAPSULATION:
+        if data[:4] != ENCAPSULATION:
             raise DecodeError(f"{self.type_name}: encapsulation {data[:4].hex()} is not little-endian CDR")
         # Shifted by four bytes, the doubles behind the encapsulation are aligned in memory: kernels take the
         # arrays as they are, in the one form for which they were compiled.
@@ -157,32 +159,46 @@ class Codec:
             ValueError: an array has not the length that the type fixes.
         """
         frame = sample.frame_id.encode() + b"\0"
-        seconds, nanoseconds = divmod(sample.stamp_ns, 1_000_000_000)
-        parts = [_ENCAPSULATION, _HEADER.pack(seconds, nanoseconds, len(frame)), frame]
-        at = 12 + len(frame)
         values = sample.__dict__
+        given: list[Any] = [ENCAPSULATION, *divmod(sample.stamp_ns, 1_000_000_000), len(frame), frame]
+        lengths = []
         for field in self.fields:
             value = values[field.name]
-            count = field.count
-            if count is None:
-                pad = -at % field.size
-                parts.append(bytes(pad) + field.struct.pack(value))
-                at += pad + field.size
+            if field.count is None:
+                given.append(value)
                 continue
-            array = np.ascontiguousarray(value, field.dtype).ravel()
-            if count == 0:
-                pad = -at % 4
-                parts.append(bytes(pad) + _U32.pack(array.size))
-                at += pad + 4
-            elif array.size != count:
-                raise ValueError(f"{self.type_name}.{field.name}: {array.size} values given, the type has {count}")
-            if array.size:
-                pad = -at % field.size
-                parts.append(bytes(pad) + array.tobytes())
-                at += pad + array.size * field.size
+            if type(value) is not np.ndarray or value.dtype is not field.dtype:
+                value = np.asarray(value, field.dtype)
+            if field.count == 0:
+                lengths.append(value.size)
+                given.append(value.size)
+            elif value.size != field.count:
+                raise ValueError(
+                    f"{self.type_name}.{field.name}: {value.size} values given, the type has {field.count}"
+                )
+            given.append(value.tobytes())
+        layout = (len(frame), *lengths)
+        packed = self._layouts.get(layout)
+        if packed is None:
+            if len(self._layouts) >= _MOST_LAYOUTS:
+                self._layouts.clear()
+            packed = self._layouts[layout] = self._packed(*layout)
+        return packed.pack(*given)
+
+    def _packed(self, frame_length: int, *lengths: int) -> struct.Struct:
+        """The whole message, for given lengths of its frame and unbounded arrays; padding is zero."""
+        code, at, unbounded = f"<4siII{frame_length}s", 12 + frame_length, iter(lengths)
+        for field in self.fields:
+            count = 1 if field.count is None else field.count
+            if field.count == 0:
+                code += f"{-at % 4}xI"
+                at += -at % 4 + 4
+                count = next(unbounded)
+            pad = -at % field.size if count else 0
+            code += f"{pad}x" + (field.code if field.count is None else f"{count * field.size}s")
+            at += pad + count * field.size
         # DDS fills a payload up to four bytes, with whatever was in memory, unless that is done here
-        parts.append(bytes(-at % 4))
-        return b"".join(parts)
+        return struct.Struct(f"{code}{-at % 4}x")
 
     def sample(self, stamp_ns: int, frame_id: str, **given: Any) -> Sample:
         """A sample with zeros in the fields that are not given."""
@@ -263,7 +279,7 @@ def stamp_of(data: bytes) -> int:
     Raises:
         DecodeError: the bytes are too short or not little-endian CDR.
     """
-    if len(data) < 12 or data[:4] != _ENCAPSULATION:
+    if len(data) < 12 or data[:4] != ENCAPSULATION:
         raise DecodeError(f"{len(data)} bytes do not begin with a Header in little-endian CDR")
     seconds, nanoseconds = struct.unpack_from("<iI", data, 4)
     return seconds * 1_000_000_000 + nanoseconds

@@ -10,10 +10,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from css_common import fault_lines
 from css_common.codec import Sample
 from css_common.epochs import mission_epoch
 from css_common.fault_lines import FaultKind, Units
+from css_common.message_columns import Columns
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
 from css_common.sections import DURATION, EPOCH
@@ -99,6 +102,31 @@ class Smoothing(NamedTuple):
 
     rate: float = 1.0  # of the body rate
     heading: float = 1.0  # of the direction to the Sun, while no gyro propagates it
+
+
+class Cycles(NamedTuple):
+    """Steps that follow one another and hold nothing out of the ordinary.
+
+    Attributes:
+        stamps_ns: (M,) of each.
+        columns: messages of each input that is not silent.
+        rows: (K,) the steps to which each of the K messages of an input belongs, rising.
+    """
+
+    stamps_ns: np.ndarray
+    columns: Mapping[str, Columns]
+    rows: Mapping[str, np.ndarray]
+
+    def spread(self, key: str, field: str) -> tuple[np.ndarray, np.ndarray] | None:
+        """A field of an input for each step, zero where there is none, and whether there is one, (M,); None: silent."""
+        if key not in self.columns:
+            return None
+        given = getattr(self.columns[key], field)
+        values = np.zeros((len(self.stamps_ns), *given.shape[1:]), given.dtype)
+        there = np.zeros(len(self.stamps_ns), np.bool_)
+        values[self.rows[key]] = given
+        there[self.rows[key]] = True
+        return values, there
 
 
 Received = Mapping[str, Any]
@@ -210,6 +238,13 @@ class Component:
         """One step: the inputs of one stamp (None for what is silent or not due) to the outputs of that stamp."""
         raise NotImplementedError
 
+    def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
+        """Many steps at once, to the messages of all of them by output: the same as `cycle` would give for each.
+
+        For those who have the inputs already, as replay has. A component need not offer it: None, and nothing is done.
+        """
+        return None
+
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
         """What it still publishes while deactivated; nothing unless overridden."""
         return {}
@@ -217,6 +252,10 @@ class Component:
     def step_of(self, stamp_ns: int) -> int:
         """Number of the control cycle at a stamp, counted from the mission epoch."""
         return round((stamp_ns - self.epoch_ns) / self.period_ns)
+
+    def steps_of(self, stamps_ns: np.ndarray) -> np.ndarray:
+        """The same for stamps (M,)."""
+        return np.rint((stamps_ns - self.epoch_ns) / self.period_ns).astype(np.int64)
 
     def message(self, key: str, stamp_ns: int, **fields: Any) -> Sample:
         """A message for output `key`; every field of its type must be given."""

@@ -5,10 +5,13 @@ Shared by live nodes and replay. Rejections are counted by kind; the first of ea
 """
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+
+import numpy as np
 
 from css_common.codec import DecodeError, Sample, codec_of
 from css_common.component import INERTIAL, Input
+from css_common.message_columns import Columns, stack_alike
 from css_common.readings import ReadingCheck
 from css_common.schema import Values
 
@@ -48,9 +51,7 @@ class StampGuard:
         """Why a stamp is refused (`answered_again`, `stamp_repeated`, `stamp_back`, `stamp_jump`); None: it passes."""
         last = self.last
         if last is None or 0 < stamp_ns - last <= self.largest_gap_ns:
-            self.last = stamp_ns
-            self._candidate = None
-            self._may_repeat = 0
+            self.take(stamp_ns)
             return None
         if self._may_repeat and stamp_ns <= last:
             self._may_repeat -= 1
@@ -68,6 +69,17 @@ class StampGuard:
             self._candidate = None
             return None
         return "stamp_back" if stamp_ns < last else "stamp_jump"
+
+    def are_in_order(self, stamps_ns: np.ndarray) -> bool:
+        """Whether each of some stamps (M,) would pass; they are not taken."""
+        steps = np.diff(stamps_ns if self.last is None else np.r_[self.last, stamps_ns])
+        return bool(np.all((steps > 0) & (steps <= self.largest_gap_ns)))
+
+    def take(self, stamp_ns: int) -> None:
+        """Takes some stamps that are in order, of which this is the last."""
+        self.last = stamp_ns
+        self._candidate = None
+        self._may_repeat = 0
 
 
 class Edge:
@@ -124,6 +136,31 @@ class Edge:
                 check.clear(getattr(sample, check.name))
             self._incomplete.clear()
         return sample
+
+    def ordinary(self, messages: Sequence[bytes]) -> Columns | None:
+        """What some messages hold if each would be accepted as it is, with nothing to count, and all have one layout.
+
+        Nothing is taken by that; `take` does.
+        """
+        try:
+            alike = stack_alike(self.codec, messages)
+        except DecodeError:
+            return None
+        if alike is None or alike.frame_id not in self.frames:
+            return None
+        columns = alike.columns
+        if any(getattr(columns, name).shape[1] != length for name, length in self.source.lengths.items()):
+            return None
+        if not all(np.all(np.isfinite(getattr(columns, field.name))) for field in self._finite_fields):
+            return None
+        if not all(check.are_whole(getattr(columns, check.name)) for check in self._checks):
+            return None
+        return columns if self.guard.are_in_order(columns.stamp_ns) else None
+
+    def take(self, columns: Columns) -> None:
+        """Accepts messages that are ordinary."""
+        self.accepted += len(columns)
+        self.guard.take(int(columns.stamp_ns[-1]))
 
     def begin_again(self) -> None:
         """Another sender takes over: stamps that were answered may come once more, which is no fault."""

@@ -4,9 +4,12 @@
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from css_common.codec import Sample
-from css_common.component import Component, Input
+from css_common.component import Component, Cycles, Input
 from css_common.edge import HISTORY
+from css_common.message_columns import Columns
 
 _MOST_PENDING = 2 * HISTORY  # more than the lead of the fastest topic over a node that was restarted
 _NEVER = -(2**63)
@@ -101,6 +104,46 @@ class Matcher:
                 self._give_up(next(iter(self._pending)))
             return []
         return [self._complete(stamp)]
+
+    def ordinary(
+        self, columns: Mapping[str, Columns], places: Mapping[str, np.ndarray]
+    ) -> tuple[Cycles, np.ndarray] | None:
+        """The cycles of messages of which none would be left over, late or missed; else None.
+
+        Nothing is taken by that; `take` does.
+
+        Args:
+            columns: the messages of each input, their stamps rising.
+            places: (M,) where in the order of all messages each of them comes, by input.
+
+        Returns:
+            the cycles, and with which message each of them is complete.
+        """
+        heeded = columns.keys() - self._unheeded
+        if not self.exact or self._pending or not heeded or heeded != self.awaited or self._speaking != self.awaited:
+            return None
+        stamps = max((columns[key].stamp_ns for key in heeded), key=len)
+        if stamps[0] <= self._done:
+            return None
+        begun, complete = np.full(len(stamps), np.iinfo(np.int64).max), np.full(len(stamps), -1)
+        steps = self._component.steps_of(stamps) if self._divided else np.zeros(len(stamps), np.int64)
+        rows = {}
+        for key in heeded:
+            rows[key] = np.flatnonzero(steps % self.inputs[key].divider == 0)
+            if not np.array_equal(columns[key].stamp_ns, stamps[rows[key]]):
+                return None
+            begun[rows[key]] = np.minimum(begun[rows[key]], places[key])
+            complete[rows[key]] = np.maximum(complete[rows[key]], places[key])
+        pending = np.searchsorted(np.sort(begun), complete) - np.arange(len(stamps))
+        if np.any(np.diff(complete, prepend=-1) <= 0) or np.any(pending > _MOST_PENDING):
+            return None
+        return Cycles(stamps, {key: columns[key] for key in heeded}, rows), complete
+
+    def take(self, columns: Mapping[str, Columns], cycles: Cycles) -> None:
+        """Takes messages of ordinary cycles."""
+        for key in cycles.columns:
+            self._newest[key] = int(columns[key].stamp_ns[-1])
+        self._done = int(cycles.stamps_ns[-1])
 
     def overdue(self) -> list[tuple[int, dict[str, Sample | None]]]:
         """Cycles that wait for optional inputs alone, oldest first; called at a deadline.

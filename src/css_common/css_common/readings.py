@@ -78,6 +78,10 @@ class ReadingCheck:
         """Every element is a reading."""
         return self._all_readable(values, self._smallest, self._largest)
 
+    def are_whole(self, rows: np.ndarray) -> bool:
+        """Every element of rows (M, N) is a reading."""
+        return bool(np.all((rows >= self._smallest) & (rows <= self._largest)))
+
     def refusal(self, values: np.ndarray) -> str | None:
         """Why an array that is not whole cannot be used at all; None when the elements that are readings can."""
         smallest, largest = self._smallest, self._largest

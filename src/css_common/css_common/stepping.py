@@ -11,8 +11,11 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from css_common.codec import Codec, Sample, codec_of
-from css_common.component import Component, Outgoing, Received, all_conflicts
+from css_common.component import Component, Cycles, Outgoing, Received, all_conflicts
+from css_common.message_columns import unstack
 from css_common.mission import Event
 from css_common.schema import ParameterError, shaped_values
 
@@ -105,6 +108,34 @@ class Stepper:
             self.apply_due(stamp_ns)
         component = self.component
         return (component.cycle if self.is_active else component.idle)(stamp_ns, received)
+
+    def is_quiet(self, stamp_ns: int) -> bool:
+        """It cycles, and no event is due up to a stamp."""
+        return self.is_active and not (self._waiting and is_due(self._waiting[0], stamp_ns - self._epoch_ns))
+
+    @property
+    def offers_steps(self) -> bool:
+        """The component can be stepped many times at once, by the class that says what one cycle is."""
+        known = {"cycle", "cycle_through"}
+        nearest = next(kind for kind in type(self.component).__mro__ if known & vars(kind).keys())
+        return nearest is not Component and "cycle_through" in vars(nearest)
+
+    def steps(self, cycles: Cycles) -> list[tuple[Port, list[tuple[int, bytes]]]] | None:
+        """What the component gives at many quiet steps: stamp and serialised message of each, by output.
+
+        None: it has to be stepped one by one, from where it was before.
+        """
+        outgoing = self.component.cycle_through(cycles)
+        if outgoing is None:
+            return None
+        given = []
+        for key, columns in outgoing.items():
+            port = self.ports[key]
+            if not all(np.all(np.isfinite(getattr(columns, field.name))) for field in port.real_fields):
+                return None
+            messages = unstack(port.codec, self.component.frames[key], columns)
+            given.append((port, list(zip(columns.stamp_ns.tolist(), messages, strict=True))))
+        return given
 
     def checked(self, outgoing: Outgoing) -> Iterator[tuple[Port, Sample]]:
         """The messages that may go out, each with its port: those without NaN or infinity."""

@@ -10,6 +10,7 @@ from sensor_msgs.msg import Imu
 from css_common.codec import Sample, codec_of
 from css_common.component import INERTIAL, Input
 from css_common.edge import CONFIRMATIONS_BACK, HISTORY, Edge, StampGuard
+from css_common.readings import Readings
 from css_common.schema import default_values
 from css_common.sections import IO, MISSION
 from css_msgs.msg import CssVoltages, SpacecraftState
@@ -264,3 +265,44 @@ def test_nothing_that_arrives_raises_and_everything_is_counted(arrivals):
         bench.offer(arrival if isinstance(arrival, bytes) else BAD[arrival][0](bench))
     assert bench.edge.accepted + bench.edge.rejected.total() == len(arrivals)
     assert len(bench.reports) == len(bench.edge.rejected)
+
+
+CELLS = Input("cells", "css/voltages", CssVoltages, lengths={"voltages": 2}, readings={"voltages": Readings(-1.0, 2.0)})
+FAULTS = {
+    "": lambda sample: None,
+    "frame": lambda sample: setattr(sample, "frame_id", "bux"),
+    "length": lambda sample: setattr(sample, "voltages", np.ones(3)),
+    "missing": lambda sample: setattr(sample, "voltages", np.array([1.0, np.nan])),
+    "impossible": lambda sample: setattr(sample, "voltages", np.array([1.0, 2.5])),
+    "infinite": lambda sample: setattr(sample, "voltages", np.array([-np.inf, 1.0])),
+}
+
+
+@given(
+    st.lists(
+        st.tuples(st.sampled_from([1, 1, 1, 1, 0, -1, 2, 700]), st.sampled_from([*FAULTS, *[""] * 20])), max_size=9
+    ),
+    st.integers(0, 3),
+)
+def test_ordinary_messages_are_accepted_ones_with_nothing_to_say(sent, before):
+    codec = codec_of(CssVoltages)
+    said: list[str] = []
+    one_by_one, at_once = (Edge(CELLS, default_values(MISSION + IO), said.append) for _ in range(2))
+    data, step = [], 0
+    for advance, fault in [(1, "")] * before + sent:
+        step += advance
+        sample = codec.sample(T0 + step * STEP, "bus", voltages=np.array([0.5, 1e-3 * step]))
+        FAULTS[fault](sample)
+        data.append(codec.encode(sample))
+    for message in data[:before]:
+        assert one_by_one.accept(message) is not None and at_once.accept(message) is not None
+    columns = at_once.ordinary(data[before:])
+    given = [one_by_one.accept(message) for message in data[before:]]
+    accepted = [sample for sample in given if sample is not None]
+    is_ordinary = bool(sent) and len(accepted) == len(given) and not said
+    assert (columns is not None) == is_ordinary
+    if columns is not None:
+        at_once.take(columns)
+        np.testing.assert_array_equal(columns.voltages, [sample.voltages for sample in accepted])
+        np.testing.assert_array_equal(columns.stamp_ns, [sample.stamp_ns for sample in accepted])
+        assert (at_once.accepted, vars(at_once.guard)) == (one_by_one.accepted, vars(one_by_one.guard))

@@ -6,7 +6,7 @@ from rclpy.executors import ExternalShutdownException
 from std_msgs.msg import Float64, Int64
 from std_srvs.srv import Trigger
 
-from css_common.executor import DrainingExecutor, create_executor, spin_until
+from css_common.executor import DrainingExecutor, create_executor, spin_about_until, spin_until
 
 
 def test_kinds(bench, monkeypatch):
@@ -52,6 +52,33 @@ def test_timers_and_services_get_their_turn_in_an_endless_exchange_of_messages(b
     bench.until(lambda: len(ticks) > 5, "the timer ticks")
     assert asked
     assert passes == list(range(len(passes))), "no message lost, none out of order"
+
+
+def test_the_condition_is_asked_while_messages_never_end(bench):
+    node = bench.node
+    publisher = node.create_publisher(Int64, "to_itself", 10)
+    passes: list[int] = []
+
+    def hand_on(message: Int64) -> None:
+        passes.append(message.data)
+        publisher.publish(Int64(data=message.data + 1))
+
+    node.create_subscription(Int64, "to_itself", hand_on, 10)
+    bench.until(lambda: publisher.get_subscription_count() == 1, "the topic is connected")
+    publisher.publish(Int64(data=0))
+    asked: list[int] = []
+
+    def seen_often() -> bool:
+        asked.append(len(passes))
+        return len(asked) > 5
+
+    timers = len(list(node.timers))
+    spin_about_until(bench.executor, seen_often, node, interval=0.002)
+    assert asked[-1] > asked[0], "messages pass meanwhile"
+    assert len(list(node.timers)) == timers
+    bench.node.create_timer(0.01, bench.context.shutdown)
+    with pytest.raises(ExternalShutdownException):
+        spin_about_until(bench.executor, lambda: False, node, interval=0.002)
 
 
 def test_messages_of_many_topics_arrive_in_the_order_of_each(bench):

@@ -2,7 +2,7 @@
 """Matching of inputs by their stamps: complete cycles only, in order, whatever the order of arrival."""
 
 import itertools
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from css_common.codec import Sample
 from css_common.component import Component, Input
 from css_common.edge import HISTORY, StampGuard
 from css_common.matching import Matcher
+from css_common.message_columns import Columns
 from css_common.schema import default_values
 from css_common.sections import IO, MISSION
 from css_msgs.msg import CssVoltages
@@ -350,3 +351,65 @@ def test_samples_keep_what_they_were_given():
     sample = Sample(3, "bus", voltages=np.zeros(2))
     assert "voltages" in repr(sample)
     assert (sample.stamp_ns, sample.frame_id) == (3, "bus")
+
+
+def state_of(matcher: Matcher) -> dict:
+    """All that the coming messages are measured by."""
+    private = {name: getattr(matcher, name) for name in ("_done", "_newest", "_missed", "_late", "_speaking")}
+    return private | {"pending": {s: sorted(slots) for s, slots in vars(matcher)["_pending"].items()}}
+
+
+def taken_at_once(matcher: Matcher, messages: Sequence[tuple[str, float]]) -> list[tuple[float, str]] | None:
+    """As `offered`, for messages of which nothing is out of the ordinary."""
+    stamps = {key: np.array([at(step).stamp_ns for k, step in messages if k == key]) for key, _ in messages}
+    places = {key: np.array([n for n, (k, _) in enumerate(messages) if k == key]) for key in stamps}
+    if any(np.any(np.diff(of_key) <= 0) for of_key in stamps.values()):
+        return None  # the edge has let none of them pass
+    columns = {key: Columns(of_key) for key, of_key in stamps.items()}
+    found = matcher.ordinary(columns, places)
+    if found is None:
+        return None
+    cycles, complete = found
+    assert np.all(np.diff(complete) > 0)
+    matcher.take(columns, cycles)
+    keys = ["".join(sorted(k for k, rows in cycles.rows.items() if n in rows)) for n in range(len(cycles.stamps_ns))]
+    return [((stamp - T0) / STEP, there) for stamp, there in zip(cycles.stamps_ns.tolist(), keys, strict=True)]
+
+
+@given(
+    st.lists(st.sampled_from(["ab", "ba", "a", "b", "", "ab", "ba", "ab"]), min_size=4, max_size=40),
+    st.integers(0, 3),
+    st.sampled_from([1, 2]),
+    st.lists(st.integers(0, 80), max_size=3),
+)
+def test_messages_taken_at_once_are_those_taken_one_by_one(senders, lag, divider, cuts):
+    # `b` comes some messages late, and is silent or alone now and then
+    messages = [
+        (n + (lag if key == "b" else 0), key, k) for k, of in enumerate(senders) for n, key in enumerate(of, 2 * k)
+    ]
+    sent = [(key, k) for _, key, k in sorted(messages) if key == "a" or k % divider == 0]
+    inputs = (entry("a"), entry("b", divider=divider))
+    one_by_one, at_once = matcher_of(inputs), matcher_of(inputs)
+    edges = [0, *sorted(min(cut, len(sent)) for cut in cuts), len(sent)]
+    for first, last in itertools.pairwise(edges):
+        part = sent[first:last]
+        given = taken_at_once(at_once, part) if part else []
+        assert (offered(at_once, *part) if given is None else given) == offered(one_by_one, *part)
+        assert state_of(at_once) == state_of(one_by_one)
+        assert at_once.unmatched == one_by_one.unmatched
+
+
+def test_a_whole_stretch_is_taken_at_once_and_one_with_a_gap_or_a_lag_is_not():
+    inputs = (entry("a"), entry("b", divider=2))
+    whole = [(key, k) for k in range(300) for key in "ab" if key == "a" or k % 2 == 0]
+    assert taken_at_once(matcher_of(inputs), whole) == [(k, "a" if k % 2 else "ab") for k in range(300)]
+    assert taken_at_once(matcher_of(inputs), [m for m in whole if m != ("b", 100)]) is None
+    assert taken_at_once(matcher_of(inputs), [m for m in whole if m != ("a", 99)]) == [
+        (k, "a" if k % 2 else "ab") for k in range(300) if k != 99
+    ]
+    # `b` so late that those which wait are given up
+    late = sorted((k + 2 * HISTORY + 5 if key == "b" else k, key, k) for k in range(300) for key in "ab")
+    assert taken_at_once(matcher_of(AB), [(key, k) for _, key, k in late]) is None
+    ahead = matcher_of(AB)
+    assert offered(ahead, ("a", 0)) == []
+    assert taken_at_once(ahead, [("a", 1), ("b", 1)]) is None, "one waits already"

@@ -12,9 +12,9 @@ import numpy as np
 
 from css_analysis.fault_record import fault_records
 from css_analysis.flight_log import LOGGED_TYPES, FlightLog
-from css_analysis.message_columns import Columns
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
+from css_common.message_columns import Columns
 from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name

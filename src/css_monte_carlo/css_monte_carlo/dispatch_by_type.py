@@ -1,25 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """One compiled loop for every estimator, with control or without: types of parameters say what is called.
 
-A kernel that is handed to another as an argument cannot be cached on disk. The parameters of an estimator are a
-NamedTuple defined in its own module, so their type names the module whose `step` belongs to them, and the compiler
-settles the call when it compiles the loop for that type. None in the place of parameters is a part that a flight does
-not have: nothing is compiled for it. Running sums name their module in the same way.
+As for Sun estimators alone (`css_estimation.sun.heading_dispatch`). None in the place of parameters is a part that a
+flight does not have: nothing is compiled for it. Running sums name their module in the same way.
 """
 
-import sys
-from types import ModuleType
-from typing import Any
-
-from numba.core import types
 from numba.extending import overload
 
+from css_estimation.sun.heading_dispatch import home_of
 from css_monte_carlo.surroundings import references_at
-
-
-def estimate_heading(p, state, memory, dt, voltages, aiding):
-    """State and `SunHeading` after one cycle of a Sun estimator; arguments in `css_estimation.sun.sun_algorithm`."""
-    return _heading_step(_home(p))(p, state, memory, dt, voltages, aiding)
 
 
 def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
@@ -31,7 +20,7 @@ def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
         around: `Surroundings`, with what the filter's own models say.
         k: row of the cycle in them.
     """
-    return _attitude_step(_home(p))(p, state, memory, dt, voltages, aiding, around, k)
+    return _attitude_step(home_of(p))(p, state, memory, dt, voltages, aiding, around, k)
 
 
 def command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
@@ -41,45 +30,22 @@ def command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
         heading: `SunHeading`.
         p, speeds, field, torque_out, dipole_out: as in `sunpoint_control.control_algorithm`.
     """
-    return _control_step(_home(p))(p, state, dt, heading, speeds, field, torque_out, dipole_out)
+    return _control_step(home_of(p))(p, state, dt, heading, speeds, field, torque_out, dipole_out)
 
 
 def tally(tallies, c, step, marks, truth, heading, attitude, memory):
     """Counts one step of case `c`; arguments as of `tally_step` in the module of the sums."""
-    _tally_step(_home(tallies))(tallies, c, step, marks, truth, heading, attitude, memory)
+    _tally_step(home_of(tallies))(tallies, c, step, marks, truth, heading, attitude, memory)
 
 
 def note_estimate(tallies, heading, attitude, out):
     """Writes what a trace keeps of the measured estimate, as `ESTIMATE_COLUMNS` of the module of the sums says."""
-    _note(_home(tallies))(tallies, heading, attitude, out)
-
-
-def _home(p: Any) -> ModuleType | None:
-    """The module that defines the type of a value, or of a numba type; None for None."""
-    if p is None or isinstance(p, types.NoneType):
-        return None
-    return sys.modules[getattr(p, "instance_class", type(p)).__module__]
-
-
-@overload(estimate_heading, jit_options={"forceinline": True})
-def _overload_heading(p, state, memory, dt, voltages, aiding):
-    return _heading_step(_home(p))
-
-
-def _heading_step(home):
-    if home is None:
-        return lambda p, state, memory, dt, voltages, aiding: (None, None)
-    step = home.step
-
-    def call(p, state, memory, dt, voltages, aiding):
-        return step(p, state, memory, dt, voltages, aiding)
-
-    return call
+    _note(home_of(tallies))(tallies, heading, attitude, out)
 
 
 @overload(estimate_attitude, jit_options={"forceinline": True})
 def _overload_attitude(p, state, memory, dt, voltages, aiding, around, k):
-    return _attitude_step(_home(p))
+    return _attitude_step(home_of(p))
 
 
 def _attitude_step(home):
@@ -110,7 +76,7 @@ def _attitude_step(home):
 
 @overload(command, jit_options={"forceinline": True})
 def _overload_command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
-    return _control_step(_home(p))
+    return _control_step(home_of(p))
 
 
 def _control_step(home):
@@ -140,7 +106,7 @@ def _control_step(home):
 
 @overload(tally, jit_options={"forceinline": True})
 def _overload_tally(tallies, c, step, marks, truth, heading, attitude, memory):
-    return _tally_step(_home(tallies))
+    return _tally_step(home_of(tallies))
 
 
 def _tally_step(home):
@@ -154,7 +120,7 @@ def _tally_step(home):
 
 @overload(note_estimate, jit_options={"forceinline": True})
 def _overload_note(tallies, heading, attitude, out):
-    return _note(_home(tallies))
+    return _note(home_of(tallies))
 
 
 def _note(home):

@@ -16,11 +16,13 @@ from css_common.random_streams import RandomKey
 from css_common.vectors import Vec3, mat3, multiply, row
 from css_environment.albedo_vector import PATCHES, point_source
 from css_environment.moving_clouds import CloudMotion, Clouds, is_cloud_step, reflect
+from css_estimation.sun.heading_dispatch import estimate_heading
+from css_estimation.sun.sky_table import sky_at
 from css_estimation.sun.sun_heading import Aiding
-from css_monte_carlo.dispatch_by_type import command, estimate_attitude, estimate_heading, note_estimate, tally
+from css_monte_carlo.dispatch_by_type import command, estimate_attitude, note_estimate, tally
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
-from css_monte_carlo.surroundings import Surroundings, gather_light_at, sky_at, state_at
+from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
 from css_sim import gyro, magnetometer, tachometer
 from css_sim.actuator_faults import Felt, spoil_actuators
 from css_sim.disturbances import with_dipole

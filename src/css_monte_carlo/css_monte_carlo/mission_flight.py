@@ -20,13 +20,14 @@ from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
+from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
 from css_monte_carlo.case_tallies import step_marks
 from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
-from css_monte_carlo.surroundings import SurroundingsTables, aligned_table
+from css_monte_carlo.surroundings import SurroundingsTables
 from css_sim import (
     actuator_faults,
     axis_faults,

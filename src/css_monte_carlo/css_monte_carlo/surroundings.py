@@ -20,9 +20,8 @@ from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.mission_environment import MissionEnvironment
 from css_environment.orbit import Orbit
 from css_estimation.attitude.flight_references import FlightReferences, References
-from css_estimation.sun import flight_sky
-from css_estimation.sun.flight_sky import FlightSky
-from css_estimation.sun.sun_heading import Sky
+from css_estimation.sun.flight_sky import FlightSky, flight_sky
+from css_estimation.sun.sky_table import aligned_table, sky_table
 from css_sim.flight_environment import flight_environment
 
 BLOCK_STEPS = 1200
@@ -49,26 +48,12 @@ REFERENCE = np.dtype(
 )
 """`References` of one step."""
 
-SKY = np.dtype(
-    [
-        ("known", np.bool_),
-        ("predicted", np.int64),
-        ("sun_n", np.float64, 3),
-        ("solar_flux", np.float64),
-        ("illumination", np.float64),
-        ("r_n", np.float64, 3),
-        ("field_n", np.float64, 3),
-    ],
-    align=True,
-)
-"""`css_estimation.sun.sun_heading.Sky` of one step, without the light of the Earth."""
-
 
 class Surroundings(NamedTuple):
     """Tables of one block of K steps."""
 
     states: np.ndarray  # (K,) of STATE
-    sky: np.ndarray  # (K,) of SKY, what the Sun estimator's own models say; (1,) when it has none
+    sky: np.ndarray  # (K,) of `sky_table.SKY`, what the Sun estimator's own models say; (1,) when it has none
     sky_light: np.ndarray  # (K, 192) light of the Earth by them; (1, 192) when it predicts none
     attitude_sky: np.ndarray  # (K,) of SKY, what an attitude filter that is aided so says; (1,) without one
     attitude_sky_light: np.ndarray  # (K, 192) light of the Earth by it; (1, 192) when it predicts none
@@ -103,22 +88,6 @@ def references_at(table, k: int) -> References:
         r.intensity,
         r.sunlit,
         (r.field_n[0], r.field_n[1], r.field_n[2]),
-    )
-
-
-@outer_kernel
-def sky_at(table, light, k: int) -> Sky:
-    """What the Sun estimator's models say at a step, of the tables `sky` and `sky_light`."""
-    s = table[min(k, table.shape[0] - 1)]
-    return Sky(
-        s.known,
-        s.predicted,
-        (s.sun_n[0], s.sun_n[1], s.sun_n[2]),
-        s.solar_flux,
-        s.illumination,
-        (s.r_n[0], s.r_n[1], s.r_n[2]),
-        (s.field_n[0], s.field_n[1], s.field_n[2]),
-        light[min(k, light.shape[0] - 1)],
     )
 
 
@@ -189,8 +158,8 @@ class SurroundingsTables:
         orbit: Orbit | None = None,
     ) -> None:
         self._environment: MissionEnvironment = flight_environment(plant, field, orbit)
-        self._sky: FlightSky | None = None if heading is None else flight_sky.flight_sky(heading)
-        self._attitude_sky: FlightSky | None = None if aided is None else flight_sky.flight_sky(aided)
+        self._sky: FlightSky | None = None if heading is None else flight_sky(heading)
+        self._attitude_sky: FlightSky | None = None if aided is None else flight_sky(aided)
         self._models: FlightReferences | None = None if attitude is None else FlightReferences(attitude)
         self._predicts_light: bool = attitude is not None and attitude.albedo.compensate
         self._period_ns = round(plant.mission.period * 1e9)
@@ -238,20 +207,9 @@ class SurroundingsTables:
             _tabulate_views(states, views, *grid.shape)
         elif grid is not None and has_light:
             _tabulate_light(self._albedo_model, states, new_earth_view(), grid, light)
-        skies = (*self._skies(self._sky, first, count), *self._skies(self._attitude_sky, first, count))
+        stamps_ns = [self._epoch_ns + (first + k) * self._period_ns for k in range(count)]
+        skies = (*sky_table(self._sky, stamps_ns), *sky_table(self._attitude_sky, stamps_ns))
         return Surroundings(states, *skies, *self._modelled(first, count), light, views)
-
-    def _skies(self, sky: FlightSky | None, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """What an estimator's models say, and the light that they predict."""
-        rows = 1 if sky is None else count
-        skies = np.zeros(rows, SKY)
-        light = aligned_table(rows if sky is not None and sky.has_light else 1, len(new_light()))
-        for k in range(rows):
-            *row, now = flight_sky.sky_at(sky, self._epoch_ns + (first + k) * self._period_ns)
-            skies[k] = tuple(row)
-            if k < len(light):
-                light[k] = now
-        return skies, light
 
     def _modelled(self, first: int, count: int) -> tuple[np.ndarray, np.ndarray]:
         """What the attitude filter's models say, and the light that they predict."""
@@ -265,13 +223,6 @@ class SurroundingsTables:
             if self._predicts_light and r.sunlit:
                 light[k] = self._models.light
         return references, light
-
-
-def aligned_table(rows: int, columns: int) -> np.ndarray:
-    """Zeros (rows, columns) float32 whose rows begin on cache lines when a row fills whole ones."""
-    raw = np.zeros(4 * rows * columns + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + 4 * rows * columns].view(np.float32).reshape(rows, columns)
 
 
 def _views(count: int) -> EarthView:

@@ -7,7 +7,7 @@ by the size that it states, by a limit on that, and by a limit on the number of 
 
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Container
 from typing import NamedTuple
 
 import lz4.frame
@@ -69,10 +69,13 @@ def unpack(body: bytes) -> bytes:
     return records
 
 
-def walk(records: bytes, learn: Callable[[int, bytes], None]) -> list[RawMessage]:
+def walk(
+    records: bytes, learn: Callable[[int, bytes], None], channels: Container[int] | None = None
+) -> list[RawMessage]:
     """Messages in file order; `ChunkError` when a record is not whole.
 
     learn: takes opcode and body of each schema and channel.
+    channels: only their messages; None: all.
     """
     messages: list[RawMessage] = []
     append, unpack_from, new = messages.append, MESSAGE_HEAD.unpack_from, tuple.__new__
@@ -93,7 +96,8 @@ def walk(records: bytes, learn: Callable[[int, bytes], None]) -> list[RawMessage
         if opcode == 5:  # Opcode.MESSAGE; the comparison with a plain number is what makes it fast
             if length < _MESSAGE_FIELDS:
                 raise ChunkError("a message is cut short")
-            append(new(RawMessage, (log_time, channel, publish_time, records[position + 31 : following])))
+            if channels is None or channel in channels:
+                append(new(RawMessage, (log_time, channel, publish_time, records[position + 31 : following])))
         elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
             learn(opcode, records[position + 9 : following])
         else:

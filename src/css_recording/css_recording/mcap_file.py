@@ -11,6 +11,7 @@ chunk, so that as much as possible can be saved; that something is damaged is ne
 import mmap
 import struct
 import zlib
+from collections.abc import Container
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -97,12 +98,13 @@ class McapFile:
             self._map.close()
         self._map = b""
 
-    def chunk_messages(self, chunk: Chunk) -> list[RawMessage]:
-        """Messages of a chunk in file order; `BagError` when it is damaged."""
+    def chunk_messages(self, chunk: Chunk, channels: Container[int] | None = None) -> list[RawMessage]:
+        """Messages of a chunk in file order, of some channels or of all; `BagError` when it is damaged."""
         body = self._map[chunk.position + 9 : chunk.position + 9 + chunk.size]
         try:
-            messages = walk(unpack(body), self._learn)
-            if messages and not self.ending.data_crc:  # nothing else vouches for the head of the chunk
+            vouched = self.ending.data_crc != 0
+            messages = walk(unpack(body), self._learn, channels if vouched else None)
+            if messages and not vouched:  # nothing else vouches for the head of the chunk
                 times = [message[0] for message in messages]
                 if min(times) < chunk.start_ns or max(times) > chunk.end_ns:
                     raise ChunkError("its messages are not of the time that it states")

@@ -174,7 +174,7 @@ class McapStorage:
         for number, chunk in sorted(chunks, key=lambda entry: (entry[0], entry[1].position)):
             names = wanted[number]
             try:
-                found = self._files[number].chunk_messages(chunk)
+                found = self._files[number].chunk_messages(chunk, names)
             except BagError as error:
                 raise damaged(self._bag, str(error)) from error
             messages += [(log_time, *names[channel], data) for log_time, channel, _, data in found if channel in names]

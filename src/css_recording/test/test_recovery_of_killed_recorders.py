@@ -50,7 +50,7 @@ def test_sigkill_costs_at_most_the_open_second(flight, tmp_path, seed, doctor):
     process = subprocess.Popen(
         [sys.executable, "-c", RECORDER, str(folder), data.hex()], stdout=subprocess.PIPE, text=True
     )
-    delay = random.Random(seed).uniform(0.0, 0.3)
+    delay = random.Random(seed).uniform(0.0, 0.1)
     lines = [present(process.stdout).readline()]
     deadline = time.monotonic() + delay
     while time.monotonic() < deadline:

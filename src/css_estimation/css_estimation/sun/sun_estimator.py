@@ -6,8 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from css_common.component import Component, Input, Outgoing, Output, Received, Smoothing
+from css_common.component import Component, Cycles, Input, Outgoing, Output, Received, Smoothing
 from css_common.kernel import typed_call
+from css_common.message_columns import Columns
 from css_common.schema import Values
 from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
@@ -17,7 +18,7 @@ from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, s
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
-from css_estimation.sun.sun_heading import Aiding, Sky
+from css_estimation.sun.sun_heading import Aiding, Measured, Sky
 from css_estimation.sun.sun_tracking import RATE_CUTOFF, USE_GYRO
 from css_msgs.msg import SunEstimate
 
@@ -61,6 +62,31 @@ def aiding_of(received: Received, sky: Sky) -> Aiding:
         wheels is not None,
         sky,
     )
+
+
+def measured_in(steps: Cycles) -> Measured | None:
+    """What an algorithm is given beside the models at many steps; None when wheels are silent at some of them alone."""
+    count = len(steps.stamps_ns)
+    speeds = steps.spread("wheels", "speed")
+    if speeds is not None and not speeds[1].all():
+        return None
+    return Measured(
+        steps.columns["cells"].voltages,
+        *_vectors(steps, "gyro", "angular_velocity"),
+        *_vectors(steps, "field", "magnetic_field"),
+        np.zeros((count, 0)) if speeds is None else speeds[0],
+        speeds is not None,
+    )
+
+
+def _vectors(steps: Cycles, key: str, field: str) -> tuple[np.ndarray, np.ndarray]:
+    """The vectors (M, 3) of an input, zero where it measured none, and whether it did (M,); as `gyro_reading`."""
+    given, variances = steps.spread(key, field), steps.spread(key, f"{field}_covariance")
+    if given is None or variances is None:
+        return np.zeros((len(steps.stamps_ns), 3)), np.zeros(len(steps.stamps_ns), np.bool_)
+    (vectors, there), (covariance, _) = given, variances
+    valid = there & (covariance[:, 0] != -1.0)
+    return np.where(valid[:, np.newaxis], vectors, 0.0), valid
 
 
 class SunEstimator(Component):
@@ -114,6 +140,29 @@ class SunEstimator(Component):
         super().tune(values)
         self._parameters = self.algorithm.parameters(values)
 
+    def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
+        # here, as no node in flight needs it
+        from css_estimation.sun.heading_dispatch import home_of
+        from css_estimation.sun.heading_loop import loop_of, new_headings
+        from css_estimation.sun.sky_table import sky_table
+
+        measured = measured_in(steps)
+        # the loop finds `step` by the type of the parameters, which may be those of another module
+        if measured is None or getattr(home_of(self._parameters), "step", None) is not self.algorithm.step:
+            return None
+        stamps = steps.stamps_ns
+        before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns
+        since_s = np.diff(stamps, prepend=before) / 1e9
+        headings = new_headings(len(stamps))
+        advance = loop_of(self.algorithm.step.__module__)
+        sky = sky_table(self._sky, stamps.tolist())
+        self._state = advance(self._parameters, self._state, self._memory, since_s, measured, *sky, headings)
+        self._last_stamp_ns = int(stamps[-1])
+        if self._mode_log is not None:
+            for stamp_ns, mode in zip(stamps.tolist(), headings.mode.tolist(), strict=True):
+                self._tell(stamp_ns, mode)
+        return {"estimate": Columns(stamps, **headings._asdict())}
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         since_ns = self.period_ns if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
@@ -128,8 +177,10 @@ class SunEstimator(Component):
             cells.voltages,
             aiding,
         )
-        if self._mode_log is not None:
-            line = self._mode_log.line(stamp_ns, heading.mode)
-            if line is not None:
-                self.report(line)
+        self._tell(stamp_ns, heading.mode)
         return {"estimate": self.message("estimate", stamp_ns, **sun_estimate_fields(heading))}
+
+    def _tell(self, stamp_ns: int, mode: int) -> None:
+        line = self._mode_log.line(stamp_ns, mode) if self._mode_log is not None else None
+        if line is not None:
+            self.report(line)

@@ -67,6 +67,18 @@ UNAIDED = Aiding((0.0, 0.0, 0.0), False, (0.0, 0.0, 0.0), False, np.zeros(0), Fa
 """The cells alone."""
 
 
+class Measured(NamedTuple):
+    """What M cycles are given, a row each: the cells, and of `Aiding` what is measured."""
+
+    voltages: np.ndarray  # (M, N)
+    gyro_b: np.ndarray  # (M, 3)
+    gyro_valid: np.ndarray  # (M,)
+    field_b: np.ndarray  # (M, 3)
+    field_valid: np.ndarray  # (M,)
+    wheel_speeds: np.ndarray  # (M, W)
+    wheels_valid: bool
+
+
 class SunHeading(NamedTuple):
     """Direction to the Sun and body rate after one cycle of an estimator; see css_msgs/SunEstimate."""
 
