@@ -28,7 +28,8 @@ def test_errors_count_over_all_lines_and_nothing_is_told_of_arrays_that_nobody_d
     assert ekf["heading_error_mean_deg"] < 0.001 and ekf["heading_error_p95_deg"] < 0.001
     # two lines with two lit cells, on the spot where the third is at right angles
     assert wls["heading_error_mean_deg"] < 0.001
-    assert 5.0 < wavg["heading_error_mean_deg"] < 20.0
+    # of cells at right angles that all count, the weighted average is the direction itself
+    assert wavg["heading_error_mean_deg"] < 0.001
     for run in result["runs"]:
         assert run["steps_without_estimate"] == 0
         for quantity in ("power_positive_s", "pointing_error_mean_deg", "pointing_error_sunlit_deg"):

@@ -56,8 +56,10 @@ def fault_records(told: Iterable[Sample], epoch_ns: int) -> list[FaultRecord]:
 
 
 def _faults_of(message: Sample) -> Iterator[tuple]:
-    columns = (message.sort, message.unit, message.kind, message.value, message.second, message.begin, message.end)
-    yield from zip(*(column.tolist() for column in columns), strict=False)
+    units = zip(message.sort.tolist(), message.unit.tolist(), message.kind.tolist(), strict=False)
+    rows = message.rows[: len(message.rows) // 4 * 4].reshape(-1, 4).tolist()
+    for unit, row in zip(units, rows, strict=False):
+        yield (*unit, *row)
 
 
 def _record(fault: tuple, now_s: float) -> FaultRecord:

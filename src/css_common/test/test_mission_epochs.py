@@ -13,7 +13,8 @@ DAY_NS = 86_400 * 10**9
 
 
 def epoch(case, days):
-    return mission_epoch(default_values(MISSION, mission__case=case, mission__epoch_spread_days=days).mission)
+    given = {"mission__epoch": "2013-06-01T00:00:00Z", "mission__case": case, "mission__epoch_spread_days": days}
+    return mission_epoch(default_values(MISSION, **given).mission)
 
 
 def test_without_a_spread_all_begin_at_the_epoch():

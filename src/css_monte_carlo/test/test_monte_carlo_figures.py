@@ -66,13 +66,14 @@ def test_rates_at_fifty_minutes_are_means_of_the_minute_before(flown):
 
 def test_consistency_is_that_of_the_sampled_steps(flown):
     estimator, rows, logs = flown
-    if estimator == "wavg":
-        assert all(row["nees_mean"] is None and row["nis_mean"] is None for row in rows)
-        return
     for row, log in zip(rows, logs, strict=True):
         steps, nees = tangent_nees(log, estimator)
         assert row["nees_mean"] == pytest.approx(nees[steps % 10 == 0].mean() / 2.0, rel=1e-6)
         estimates = log.estimates[estimator]
+        if estimator == "wavg":
+            # an average has an error bar while one cell is lit, and no innovations
+            assert row["nis_mean"] is None
+            continue
         assert row["nis_mean"] == pytest.approx(estimates.nis.sum() / estimates.nis_dof.sum(), rel=1e-9)
 
 

@@ -63,7 +63,14 @@ class Failing:
         def column(name: str) -> np.ndarray:
             return np.array([getattr(fault, name) for fault in acting], np.uint32)
 
-        values = [(*fault.values, 0.0, 0.0)[:2] for fault in acting]
+        table = [
+            (
+                *(*fault.values, 0.0, 0.0)[:2],
+                fault.first_step * period,
+                fault.end_step * period if fault.end_step < NEVER else -1.0,
+            )
+            for fault in acting
+        ]
         return {
             _KEY: component.message(
                 _KEY,
@@ -71,9 +78,6 @@ class Failing:
                 sort=column("sort"),
                 unit=column("unit"),
                 kind=column("kind"),
-                value=np.array([value for value, _ in values]),
-                second=np.array([second for _, second in values]),
-                begin=np.array([fault.first_step * period for fault in acting]),
-                end=np.array([fault.end_step * period if fault.end_step < NEVER else -1.0 for fault in acting]),
+                rows=np.array(table, dtype=np.float64).ravel(),
             )
         }

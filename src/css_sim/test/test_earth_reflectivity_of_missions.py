@@ -15,7 +15,8 @@ KEY = random_key(4, 2)
 
 
 def values(**changes):
-    return default_values(MISSION + earth_reflectivity.PARAMETERS, **{f"albedo__{k}": v for k, v in changes.items()})
+    given = {f"albedo__{k}": v for k, v in changes.items()}
+    return default_values(MISSION + earth_reflectivity.PARAMETERS, mission__duration=5550.0, **given)
 
 
 def reflectivity(key=KEY, **changes):

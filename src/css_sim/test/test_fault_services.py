@@ -48,13 +48,8 @@ def test_faults_of_a_flight_act_from_their_injection_on_and_are_told(paused):
     bench.until(lambda: len(cells) >= 19 and len(wheels_told) == 2, "all messages have come")
     assert all(message.voltages[1] == 0.77 for message in cells if message.stamp_ns > mission.epoch_ns)
     (first,) = told
-    assert (first.stamp_ns, *first.unit, *first.kind, *first.value) == (
-        mission.epoch_ns + 10**8,
-        1,
-        Faults.KIND_STUCK,
-        0.77,
-    )
-    assert first.begin.tolist() == [0.1] and first.end.tolist() == [-1.0]
+    assert (first.stamp_ns, *first.unit, *first.kind) == (mission.epoch_ns + 10**8, 1, Faults.KIND_STUCK)
+    assert first.rows.tolist() == [0.77, 0.0, 0.1, -1.0]
     dead = np.array([message.torque[2] == 0.0 for message in wheels])
     assert np.array_equal(dead, [message.stamp_ns - mission.epoch_ns <= 10**9 for message in wheels])
     assert [(m.stamp_ns - mission.epoch_ns, m.unit.tolist()) for m in wheels_told] == [(10**8, [2]), (10**9, [])]
