@@ -36,9 +36,6 @@ class FieldReading(NamedTuple):
     refused: bool
 
 
-NO_FIELD = FieldReading(0.0, 0, False)
-
-
 @kernel
 def field_usable(p: SunFilterParameters, aiding: Aiding) -> bool:
     """True when there is a measurement of this cycle and a model to compare it with."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The error of the heading as the Sun filter reports it: its own covariance, and what lasts too long to be noise."""
+"""The heading as the Sun filter reports it, with its error: that of all turns it follows, and of an unknown Earth."""
 
 import math
 
