@@ -54,11 +54,13 @@ def sun_estimate_fields(heading: SunHeading) -> dict[str, Any]:
         "age": heading.age,
         "nis": heading.nis,
         "lit_mask": heading.lit_mask,
+        "isolated": heading.isolated,
         "nis_dof": heading.nis_dof,
         "validity": heading.validity,
         "rate_source": heading.rate_source,
         "eclipse": heading.eclipse,
         "mode": heading.mode,
+        "sensors_left": heading.sensors_left,
     }
 
 

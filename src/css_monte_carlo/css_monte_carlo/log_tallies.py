@@ -22,7 +22,7 @@ from css_monte_carlo.step_truth import Truth
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 _NO_HEADING = SunHeading(
-    _ZERO, sun_heading.NO_COVARIANCE, _ZERO, 0.0, 0.0, 0, 0, sun_heading.VALIDITY_NONE, sun_heading.RATE_NONE, 0, 0
+    _ZERO, sun_heading.NO_COVARIANCE, _ZERO, 0.0, 0.0, 0, 0, sun_heading.VALIDITY_NONE, sun_heading.RATE_NONE, 0, 0, 0, 0
 )
 _NO_ATTITUDE = AttitudeSolution(_ZERO, _ZERO, _ZERO, 0.0, 0.0, 0, 0, attitude_solution.VALIDITY_NONE, 0, 0)
 
@@ -119,7 +119,7 @@ def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b, rod_dip
 def _heading(estimates, row: int) -> SunHeading:
     e = estimates
     covariance: Covariance = tuple(e.covariance[row].tolist())
-    numbers = (e.nis_dof, e.lit_mask, e.validity, e.rate_source, e.eclipse, e.mode)
+    numbers = (e.nis_dof, e.lit_mask, e.validity, e.rate_source, e.eclipse, e.mode, e.isolated, e.sensors_left)
     return SunHeading(
         _vec3(e.sun_b[row]),
         covariance,

@@ -30,7 +30,7 @@ OFF_DEG = 2.0  # of the estimate from the true Sun
 
 
 def heading(sun_b):
-    return SunHeading(tuple(sun_b), NO_COVARIANCE, STILL, 0.0, 0.0, 0, 1, VALIDITY_VALID, 0, 0, 1)
+    return SunHeading(tuple(sun_b), NO_COVARIANCE, STILL, 0.0, 0.0, 0, 1, VALIDITY_VALID, 0, 0, 1, 0, 0)
 
 
 def tallied(pointing_deg, illumination, rates, period_s):

@@ -22,8 +22,10 @@ class ControlOutput(NamedTuple):
     dumping: bool
     wheels_saturated: int  # bit i: wheel i was asked for more than it may give
     rods_saturated: int  # bit i: rod i was asked for more than it may give
+    wheels_isolated: int  # bit i: wheel i is held for failed
+    rods_isolated: int  # bit i: rod i is
 
 
 def at_rest(mode: int, reason: int) -> ControlOutput:
     """Output of a control that does nothing: no torque, nothing known."""
-    return ControlOutput(_ZERO, _ZERO, _ZERO, -1.0, 0.0, mode, reason, False, False, 0, 0)
+    return ControlOutput(_ZERO, _ZERO, _ZERO, -1.0, 0.0, mode, reason, False, False, 0, 0, 0, 0)

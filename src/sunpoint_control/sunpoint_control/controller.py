@@ -133,6 +133,8 @@ class Controller(Component):
             wheel_momentum_b=np.array(output.wheel_momentum_b),
             pointing_error=output.pointing_error,
             rate=output.rate,
+            wheels_isolated=output.wheels_isolated,
+            rods_isolated=output.rods_isolated,
             mode=output.mode,
             reason=output.reason,
             deadband=int(output.deadband),

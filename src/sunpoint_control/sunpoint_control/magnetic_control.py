@@ -183,5 +183,7 @@ def step(
         False,
         0,
         rods_saturated,
+        wheels_isolated=0,
+        rods_isolated=0,
     )
     return MagneticState(motion, since, torque_b, mode_state), output

@@ -207,5 +207,7 @@ def step(
         dumping,
         wheels_saturated,
         rods_saturated,
+        wheels_isolated=0,
+        rods_isolated=0,
     )
     return ControlState(integral, spin, mode_state), output

@@ -27,13 +27,15 @@ class Headings(NamedTuple):
     rate_source: np.ndarray
     eclipse: np.ndarray
     mode: np.ndarray
+    isolated: np.ndarray
+    sensors_left: np.ndarray
 
 
 def new_headings(count: int) -> Headings:
     """Room for as many."""
     vectors = (np.zeros((count, size)) for size in (3, 9, 3))
     reals = (np.zeros(count) for _ in range(2))
-    return Headings(*vectors, *reals, *(np.zeros(count, np.int64) for _ in range(6)))
+    return Headings(*vectors, *reals, *(np.zeros(count, np.int64) for _ in range(8)))
 
 
 @cache
@@ -71,4 +73,5 @@ def _advance(p: Any, state: Any, memory: Any, since_s, measured: Measured, sky, 
         out.nis_dof[k], out.lit_mask[k] = heading.nis_dof, heading.lit_mask
         out.validity[k], out.rate_source[k] = heading.validity, heading.rate_source
         out.eclipse[k], out.mode[k] = heading.eclipse, heading.mode
+        out.isolated[k], out.sensors_left[k] = heading.isolated, heading.sensors_left
     return state

@@ -22,6 +22,9 @@ RATE_MOMENTUM = 4
 ECLIPSE_SUNLIT = 0
 ECLIPSE_ECLIPSED = 1
 
+LEFT_GYRO = 1
+LEFT_FIELD = 2
+
 # What an orbit model says about the shadow, if there is one.
 PREDICTION_UNKNOWN = -1
 PREDICTION_SUNLIT = 0
@@ -93,3 +96,5 @@ class SunHeading(NamedTuple):
     rate_source: int  # RATE_*
     eclipse: int  # ECLIPSE_*
     mode: int  # documented with the estimator
+    isolated: int  # bit i: cell i is held for failed
+    sensors_left: int  # LEFT_*, added
