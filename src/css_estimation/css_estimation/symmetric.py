@@ -82,6 +82,15 @@ def congruence(m: Mat3, p: Symmetric) -> Symmetric:
 
 
 @kernel
+def inverse(p: Symmetric) -> Symmetric:
+    """P^-1 of a positive definite P."""
+    xx, xy, xz, yy, yz, zz = p
+    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+    k = 1.0 / (xx * a + xy * b + xz * c)
+    return (k * a, k * b, k * c, k * (xx * zz - xz * xz), k * (xy * xz - xx * yz), k * (xx * yy - xy * xy))
+
+
+@kernel
 def row_major(p: Symmetric) -> tuple[float, float, float, float, float, float, float, float, float]:
     """All nine elements, row by row."""
     return (p[0], p[1], p[2], p[1], p[3], p[4], p[2], p[4], p[5])

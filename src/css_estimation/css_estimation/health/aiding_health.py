@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stands before every Sun estimator: of what other sensors measured, what an estimator can trust."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.declared import builder, part, table_of
+from css_common.health import SORT_GYRO, SORT_MAGNETOMETER, new_verdicts
+from css_common.kernel import kernel
+from css_common.vectors import Vec3
+from css_estimation.health import gyro_state
+from css_estimation.health.gyro_fit import new_fits
+from css_estimation.health.gyro_health import check_gyro
+from css_estimation.health.gyro_state import GyroHealthParameters, GyroState
+from css_estimation.health.rate_checks import new_axes
+from css_estimation.health.sight import Sight
+from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO, Aiding
+
+
+class AidingHealthParameters(NamedTuple):
+    """Of gyro and magnetometer."""
+
+    gyro: GyroHealthParameters = part(GyroHealthParameters)
+
+
+PARAMETERS = table_of(AidingHealthParameters)
+parameters = builder(AidingHealthParameters)
+
+
+class Trusted(NamedTuple):
+    """What takes the place of the same fields of `Aiding`; kernels hand no arrays back, and that has some."""
+
+    gyro_b: Vec3
+    gyro_valid: bool
+    field_b: Vec3
+    field_valid: bool
+    left: int  # LEFT_*, added: what it had to do without
+
+
+class AidingHealthState(NamedTuple):
+    """From cycle to cycle."""
+
+    step: int  # cycles so far
+    gyro: GyroState
+
+
+class AidingHealthMemory(NamedTuple):
+    """Arrays that are advanced in place."""
+
+    axes: np.ndarray  # (3,) of GYRO_AXIS
+    fits: np.ndarray  # of `gyro_fit`
+    gyro_verdicts: np.ndarray  # (3,) of VERDICT
+    field_verdicts: np.ndarray  # (3,) of VERDICT
+
+
+def initial_state(p: AidingHealthParameters) -> AidingHealthState:
+    """Everything is trusted."""
+    return AidingHealthState(0, gyro_state.initial_state(p.gyro))
+
+
+def initial_memory(p: AidingHealthParameters) -> AidingHealthMemory:
+    """Nothing held for failed."""
+    return AidingHealthMemory(new_axes(), new_fits(), new_verdicts(SORT_GYRO, 3), new_verdicts(SORT_MAGNETOMETER, 3))
+
+
+@kernel
+def check_aiding(
+    p: AidingHealthParameters,
+    state: AidingHealthState,
+    memory: AidingHealthMemory,
+    dt: float,
+    aiding: Aiding,
+    sight: Sight,
+) -> tuple[AidingHealthState, Trusted]:
+    """State, and what can be trusted.
+
+    Args:
+        dt: [s] since the last cycle.
+        aiding: as measured.
+        sight: the Sun by the cells alone, of the last cycle.
+    """
+    gyro, gyro_b, gyro_valid, gyro_left = check_gyro(
+        p.gyro,
+        state.gyro,
+        memory.axes,
+        memory.fits,
+        memory.gyro_verdicts,
+        dt,
+        state.step,
+        aiding.gyro_b,
+        aiding.gyro_valid,
+        sight,
+    )
+    left = LEFT_GYRO if gyro_left else 0
+    trusted = Trusted(gyro_b, gyro_valid, aiding.field_b, aiding.field_valid, left)
+    return AidingHealthState(state.step + 1, gyro), trusted

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the gyro is right, by its own samples and by the Sun line; what is given on of its rate.
+
+Modes and remedies stand in `gyro_state`. The Sun tells of two axes; of that along the Sun line nothing is known but
+jumps, until the line has moved through the body. Without the Sun nothing is judged but samples, and all verdicts stand.
+"""
+
+from css_common.health import EVIDENCE_DEAD, EVIDENCE_NOISE, EVIDENCE_SUN, KIND_SILENT, hold
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, add, scale
+from css_estimation.health.gyro_bias import corrected
+from css_estimation.health.gyro_judgement import heed_jumps, judge, release_all
+from css_estimation.health.gyro_samples import READING_ABSENT, READING_FAILED, READING_JUMPED, check_samples
+from css_estimation.health.gyro_state import (
+    GYRO_CORRECTED,
+    GYRO_LEFT,
+    GyroHealthParameters,
+    GyroState,
+    Opinion,
+    Readings,
+    leave,
+)
+from css_estimation.health.rate_checks import forget_samples
+from css_estimation.health.reference_line import off_the_gyro
+from css_estimation.health.sight import Sight
+from css_estimation.health.sight_line import (
+    begin_again,
+    block_variance,
+    follow_sight,
+    interrupted,
+)
+
+
+@kernel
+def _not_given(
+    p: GyroHealthParameters, state: GyroState, axes, fits, verdicts, dt: float, step: int
+) -> tuple[GyroState, Vec3, bool, bool]:
+    """A cycle without a reading."""
+    r = state.readings
+    if not r.spoken:
+        return state, r.rate_b, False, False
+    silent = r.silent + dt
+    opinion = state.opinion
+    if silent > p.silence and r.silent <= p.silence:
+        for i in range(3):
+            forget_samples(axes[i])
+            hold(verdicts[i], KIND_SILENT, EVIDENCE_DEAD, silent, p.silence, step)
+        opinion = leave(p, opinion, fits, opinion.claim)
+    readings = Readings(r.rate_b, r.before_b, r.dt, True, silent)
+    state = GyroState(readings, opinion, interrupted(state.sight))
+    return state, r.rate_b, False, opinion.mode == GYRO_LEFT
+
+
+@kernel
+def _compare_with_sun(
+    p: GyroHealthParameters, state: GyroState, fits, verdicts, step: int, sight: Sight
+) -> GyroState:
+    """Follows the Sun line through one cycle, and judges the gyro at the end of a block."""
+    r = state.readings
+    # the sight is that of the last cycle
+    rate_b = scale(0.5, add(r.before_b, r.rate_b))
+    opinion = state.opinion
+    line, behind_b = follow_sight(state.sight, r.dt, rate_b, opinion.bias.bias_b, p.largest_error, sight)
+    if sight.known and line.line.time >= p.block:
+        variance = block_variance(p.sight, line, sight, r.dt, p.checks.noise * p.checks.noise)
+        block = line.line
+        opinion = judge(
+            p,
+            opinion,
+            fits,
+            verdicts,
+            block.by_bias,
+            block.by_scale,
+            off_the_gyro(block, behind_b),
+            variance,
+            2,
+            block.time,
+            EVIDENCE_SUN,
+            step,
+        )
+        line = begin_again(line, sight, opinion.bias.bias_b)
+    return GyroState(r, opinion, line)
+
+
+@kernel
+def check_gyro(
+    p: GyroHealthParameters,
+    state: GyroState,
+    axes,
+    fits,
+    verdicts,
+    dt: float,
+    step: int,
+    gyro_b: Vec3,
+    valid: bool,
+    sight: Sight,
+) -> tuple[GyroState, Vec3, bool, bool]:
+    """One cycle.
+
+    Args:
+        axes: (3,) of GYRO_AXIS, advanced.
+        fits: of `gyro_fit`, advanced.
+        verdicts: (3,) of VERDICT, one an axis.
+        dt: [s] since the last cycle.
+        step: number of the cycle.
+        gyro_b, valid: the reading [rad/s], and whether there is one.
+        sight: of the last cycle.
+
+    Returns:
+        State; rate to go on with [rad/s]; whether there is one; whether the gyro is left.
+    """
+    if not valid:
+        return _not_given(p, state, axes, fits, verdicts, dt, step)
+    r = state.readings
+    rate_b, reading = check_samples(p.checks, axes, verdicts, r.silent + dt, step, gyro_b, r.rate_b)
+    opinion = state.opinion
+    if reading == READING_ABSENT:
+        return state, rate_b, False, opinion.mode == GYRO_LEFT
+    line = state.sight
+    if reading == READING_FAILED:
+        opinion = leave(p, opinion, fits, opinion.claim)
+        line = interrupted(line)
+    elif reading == READING_JUMPED:
+        opinion = heed_jumps(p, opinion, axes, fits, verdicts, EVIDENCE_NOISE, step)
+        line = interrupted(line)
+    if r.silent > 0.0 or not r.spoken:
+        line = interrupted(line)
+    else:
+        state = _compare_with_sun(p, GyroState(r, opinion, line), fits, verdicts, step, sight)
+        opinion, line = state.opinion, state.sight
+    readings = Readings(rate_b, r.rate_b if r.spoken else rate_b, dt, True, 0.0)
+    if opinion.mode == GYRO_CORRECTED:
+        rate_b = corrected(rate_b, opinion.bias, p.body_rate)
+    left = opinion.mode == GYRO_LEFT
+    return GyroState(readings, opinion, line), rate_b, not left, left

@@ -1,0 +1,182 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What one axis of a gyro says about itself, from sample to sample.
+
+range    not a number, or a rate beyond any of this spacecraft
+spike    farther from the last good sample than noise and torques can bring it: that one is left out. When the next
+         ones agree with it, it was a jump: the body cannot have done it, so the error of the gyro has changed by it
+stuck    so often the very same number that noise and rounding would show it once in 1e9 runs
+noise    squared differences of successive samples, averaged, beyond what noise and torques make of them
+
+A body without torque changes its rate by |J^-1 (w x J w)| < |w|^2 at most, whatever its moments of inertia, which add
+up as those of a body do; control adds `acceleration`.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from css_common.declared import computed, given, made, table_of
+from css_common.kernel import kernel
+from css_common.schema import real
+
+_FALSE_ALARM = 1e-9  # of one run of samples
+_FEWEST_EQUAL = 5  # a message that came twice or thrice is not a stuck axis
+_MOST_EQUAL = 1000
+_AGREEING = 4  # samples in a row make a jump
+_SHARE = 1.0 / 20.0  # of a new sample in averages
+_SIGMAS = 6.0
+# Squared differences of neighbours have their noise in common: an average of 39 of them is worth so many that do not.
+_DEGREES_OF_FREEDOM = (2.0 / _SHARE - 1.0) / 1.5
+MOST_REFUSED = 0.3
+"""Share of the samples, averaged, that may be spikes."""
+
+NOISE = real("health.gyro.noise_deg_s", 0.03, "deg/s", "white noise of a sample, 1 sigma", low=1e-9, high=100.0)
+RESOLUTION = real(
+    "health.gyro.resolution_deg_s", 0.0, "deg/s", "step of its output; 0: continuous", low=0.0, high=100.0
+)
+
+GYRO_AXIS = np.dtype(
+    [
+        ("raw", np.float64),  # last sample [rad/s]
+        ("good", np.float64),  # last that was used
+        ("jump", np.float64),  # of the last jump
+        ("change", np.float64),  # [-] mean squared change over the expected
+        ("refused", np.float64),  # [-] share of the samples, averaged
+        ("gap", np.float64),  # [s] since the last good sample
+        ("equal", np.int64),  # samples in a row that were as the one before
+        ("agreeing", np.int64),  # refused samples in a row that agree with one another
+        ("seen", np.int64),  # there is a sample
+        ("zeros", np.int64),  # spells of exact zeros so far
+        ("came_by_jump", np.int64),  # what it reads now was jumped to
+        ("jumped", np.int64),  # in this cycle
+    ],
+    align=True,
+)
+"""One axis from cycle to cycle."""
+
+SAMPLE_GOOD, SAMPLE_REFUSED, SAMPLE_JUMPED, SAMPLE_STUCK, SAMPLE_RANGE, SAMPLE_NOISY, SAMPLE_SPIKY = range(7)
+
+
+def gamma_quantile(degrees_of_freedom: float, sigmas: float) -> float:
+    """Chi-square over its degrees of freedom that is passed as seldom as a normal passes `sigmas` (Wilson, Hilferty)."""
+    k = 2.0 / (9.0 * degrees_of_freedom)
+    return (1.0 - k + sigmas * math.sqrt(k)) ** 3
+
+
+def equal_count(noise: float, resolution: float) -> int:
+    """How many samples in a row must be as the one before until noise and rounding no longer explain it."""
+    # the chance that two normals fall into one step: the density of their difference at 0 times the step
+    chance = min(resolution / (2.0 * math.sqrt(math.pi) * noise), 0.999)
+    if chance <= 0.0:
+        return _FEWEST_EQUAL
+    count = math.ceil(math.log(_FALSE_ALARM) / math.log(chance))
+    return min(max(count, _FEWEST_EQUAL), _MOST_EQUAL)
+
+
+class RateChecks(NamedTuple):
+    """Rates in rad/s."""
+
+    noise: float = made(math.radians, NOISE)
+    gate: float = made(
+        lambda noise, resolution: _SIGMAS * math.sqrt(2.0) * math.radians(noise) + math.radians(resolution),
+        NOISE,
+        RESOLUTION,
+    )
+    difference: float = made(  # [rad2/s2] mean square of the difference of two samples
+        lambda noise, resolution: 2.0 * math.radians(noise) ** 2 + math.radians(resolution) ** 2 / 6.0,
+        NOISE,
+        RESOLUTION,
+    )
+    largest_change: float = computed(lambda values: gamma_quantile(_DEGREES_OF_FREEDOM, _SIGMAS))
+    equal: int = made(equal_count, NOISE, RESOLUTION)
+    acceleration: float = made(  # [rad/s2]
+        math.radians,
+        real(
+            "health.gyro.acceleration_deg_s2",
+            1.0,
+            "deg/s^2",
+            "largest angular acceleration by actuators",
+            low=0.0,
+            high=1e4,
+        ),
+    )
+    patience: float = given(
+        real("health.gyro.patience", 1.0, "s", "without a number for longer an axis fails", low=0.0, high=1e4)
+    )
+    limit: float = made(
+        math.radians,
+        real("health.gyro.range_deg_s", 300.0, "deg/s", "no rate of this spacecraft is larger", low=0.1, high=1e5),
+    )
+
+
+PARAMETERS = table_of(RateChecks)
+
+
+def new_axes() -> np.ndarray:
+    """Nothing seen on any axis."""
+    axes = np.zeros(3, GYRO_AXIS)
+    axes["change"] = 1.0
+    return axes
+
+
+@kernel
+def forget_samples(axis) -> None:
+    """After a silence: the next sample is the first."""
+    axis.seen = axis.equal = axis.agreeing = 0
+    axis.change, axis.refused, axis.gap = 1.0, 0.0, 0.0
+
+
+@kernel
+def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
+    """Judges one sample; `axis.good` is the rate to go on with [rad/s].
+
+    Args:
+        axis: of GYRO_AXIS, advanced.
+        dt: [s] since the last sample.
+        x: the sample [rad/s].
+        speed: rate of the body [rad/s], all axes.
+
+    Returns:
+        SAMPLE_*; a jump is in `axis.jump`.
+    """
+    axis.jumped = 0
+    # a NaN compares false
+    if not abs(x) <= p.limit:
+        axis.gap += dt
+        return SAMPLE_RANGE
+    if axis.seen == 0:
+        axis.raw = axis.good = x
+        axis.seen = 1
+        return SAMPLE_GOOD
+    axis.gap += dt
+    by_torque = p.acceleration + speed * speed
+    change = x - axis.raw
+    step = p.gate + by_torque * dt
+    if change == 0.0:
+        axis.equal += 1
+    else:
+        axis.equal = 0
+        axis.came_by_jump = 1 if abs(change) > step else 0
+        axis.zeros += 1 if x == 0.0 else 0
+    axis.raw = x
+    if axis.equal >= p.equal:
+        return SAMPLE_STUCK
+    off = abs(x - axis.good) > p.gate + by_torque * axis.gap
+    axis.refused += _SHARE * ((1.0 if off else 0.0) - axis.refused)
+    if axis.refused > MOST_REFUSED:
+        axis.good, axis.gap, axis.agreeing = x, 0.0, 0
+        return SAMPLE_SPIKY
+    if off:
+        axis.agreeing = axis.agreeing + 1 if abs(change) <= step else 1
+        if axis.agreeing < _AGREEING:
+            return SAMPLE_REFUSED
+        axis.jump, axis.jumped = x - axis.good, 1
+        axis.good, axis.gap, axis.agreeing = x, 0.0, 0
+        return SAMPLE_JUMPED
+    axis.agreeing = 0
+    axis.good, axis.gap = x, 0.0
+    if abs(change) <= step:
+        torque = by_torque * dt
+        axis.change += _SHARE * (change * change / (p.difference + torque * torque) - axis.change)
+    return SAMPLE_NOISY if axis.change > p.largest_change else SAMPLE_GOOD
