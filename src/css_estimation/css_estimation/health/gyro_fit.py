@@ -17,7 +17,7 @@ from css_common.vectors import Mat3, Vec3, dot
 from css_estimation.symmetric import Symmetric, inverse, product
 
 # A wrong sign makes an error of twice the reading: how near it must be to that, in sigma and at least.
-_SIGN_SIGMAS, _SIGN_WIDTH = 3.0, 0.3
+_SIGN, _SIGN_SIGMAS, _SIGN_WIDTH = 2.0, 3.0, 0.3
 _LARGEST_INNOVATION = 4.0  # [sigma]
 _ROUNDING = 1e-9
 
@@ -139,6 +139,28 @@ def best_shape(fits, drifts: bool, largest_bias: float, usual: float) -> Shape:
 
 
 @kernel
+def wrong_sign(fits, largest_bias: float, threshold: float, margin: float) -> Shape:
+    """The axis whose error is twice its reading, where that alone explains as much as biases on all axes do.
+
+    Args:
+        threshold: least that it must take from the sum of squares.
+        margin: by how much three biases may explain more.
+    """
+    covariance = _bias_covariance(fits, largest_bias)
+    b = fits[BIASES]
+    right = (b.x, b.y, b.z)
+    least = max(threshold, dot(right, product(covariance, right)) - margin)
+    best = NO_SHAPE
+    for axis in range(3):
+        e = fits[axis]
+        # |d|^2 - |d - 2 phi|^2
+        taken = 4.0 * (e.xy - e.xx)
+        if taken > max(least, best.statistic):
+            best = Shape(axis, False, taken, _SIGN, 1.0 / e.xx)
+    return best
+
+
+@kernel
 def refutes(fits, claim: Shape, largest_bias: float, usual: float, sigmas2: float) -> bool:
     """Whether an axis whose error once went with its rate shows that it does so no longer.
 
@@ -153,9 +175,21 @@ def refutes(fits, claim: Shape, largest_bias: float, usual: float, sigmas2: floa
 
 
 @kernel
+def sign_of_axis(axis: int, sigma: float) -> Shape:
+    """A wrong sign of an axis that is known to `sigma` of its reading."""
+    return Shape(axis, False, 1.0, _SIGN, sigma * sigma)
+
+
+@kernel
+def is_motion(shape: Shape) -> bool:
+    """Whether an error that goes with the rate is one of the rate, and not all that an axis reads of a body at rest."""
+    return abs(shape.value - 1.0) > _SIGN_WIDTH
+
+
+@kernel
 def kind_of(shape: Shape) -> int:
     """`KIND_*` of css_msgs/Faults that a shape is."""
     if shape.drifts:
         return KIND_DRIFTING
     width = max(_SIGN_WIDTH, _SIGN_SIGMAS * np.sqrt(shape.variance))
-    return KIND_SIGN if abs(shape.value - 2.0) < width else KIND_SCALED
+    return KIND_SIGN if abs(shape.value - _SIGN) < width else KIND_SCALED

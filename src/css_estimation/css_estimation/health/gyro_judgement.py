@@ -3,11 +3,11 @@
 
 import math
 
-from css_common.health import KIND_BIAS, KIND_DRIFTING, KIND_UNKNOWN, hold, release, rename
+from css_common.health import KIND_BIAS, KIND_DRIFTING, KIND_SIGN, KIND_UNKNOWN, hold, release, rename
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3
 from css_estimation.health.gyro_bias import Bias, after_jumps, axis_significance, jumped, learn, significance, walk
-from css_estimation.health.gyro_fit import NO_SHAPE, add_block, best_shape, forget_fits, kind_of, refutes
+from css_estimation.health.gyro_fit import NO_SHAPE, add_block, best_shape, forget_fits, is_motion, kind_of, refutes, sign_of_axis, wrong_sign
 from css_estimation.health.gyro_state import (
     GYRO_CORRECTED,
     GYRO_LEFT,
@@ -18,6 +18,7 @@ from css_estimation.health.gyro_state import (
     leave,
 )
 
+_SIGN_TOLD = 4.0
 _FEWEST_BLOCKS = 10  # in a trial
 _FEWEST_BIASED = 5  # that tell a bias: a single one is no evidence, however far it is off
 
@@ -99,7 +100,12 @@ def judge(
     drift = best_shape(fits, True, p.largest_bias, p.usual_drift)
     scaled = best_shape(fits, False, p.largest_bias, p.usual_scale)
     # while the rate hardly changes the one looks like the other; a bias that drifts can be followed
-    goes_with_rate = scaled.statistic > max(p.threshold, drift.statistic + p.agreement)
+    goes_with_rate = scaled.statistic > max(p.threshold, drift.statistic + p.agreement) and is_motion(scaled)
+    if not goes_with_rate and bias.blocks >= _FEWEST_BIASED:
+        # a bias may by chance be near twice the reading: it has to be told from that too
+        swapped = wrong_sign(fits, p.largest_bias, _SIGN_TOLD * p.threshold, p.agreement)
+        if swapped.statistic > 0.0:
+            scaled, goes_with_rate = swapped, True
     shape = scaled if goes_with_rate else drift
     shaped = shape.statistic > p.threshold
     contradicted = bias.nis > p.largest_nis or goes_with_rate or not _is_bias(bias, p.largest_error)
@@ -170,13 +176,18 @@ def heed_jumps(p: GyroHealthParameters, opinion: Opinion, axes, fits, verdicts, 
     """The opinion after axes have jumped by what no body can: their error has changed by so much."""
     if opinion.mode == GYRO_LEFT:
         return anew(p, fits, GYRO_LEFT, opinion.claim, opinion.trial_time)
+    gate = p.checks.gate
+    for i in range(3):
+        before = axes[i].good - axes[i].jump
+        if axes[i].jumped != 0 and abs(before) > gate and abs(axes[i].good + before) < gate:
+            _accuse(verdicts[i], KIND_SIGN, evidence, abs(axes[i].jump), gate, step)
+            return leave(p, opinion, fits, sign_of_axis(i, gate / abs(before)))
     for i in range(3):
         if axes[i].jumped != 0 and verdicts[i].held == 0:
-            hold(verdicts[i], KIND_BIAS, evidence, abs(axes[i].jump), p.checks.gate, step)
+            hold(verdicts[i], KIND_BIAS, evidence, abs(axes[i].jump), gate, step)
     jump_b = (_jump(axes[0]), _jump(axes[1]), _jump(axes[2]))
-    gate = p.checks.gate * p.checks.gate
     trusted = opinion.mode == GYRO_TRUSTED
-    bias = after_jumps(jump_b, p.usual_bias, gate) if trusted else jumped(opinion.bias, jump_b, gate)
+    bias = after_jumps(jump_b, p.usual_bias, gate * gate) if trusted else jumped(opinion.bias, jump_b, gate * gate)
     forget_fits(fits)
     return Opinion(GYRO_CORRECTED, bias, opinion.drift, 0.0, 0.0, False, NO_SHAPE, opinion.trial_time)
 

@@ -27,31 +27,30 @@ from css_estimation.health.rate_checks import (
     SAMPLE_STUCK,
     RateChecks,
     check_sample,
+    restless,
 )
 
 _SPELLS = 2  # of zeros that make an axis an intermittent one
-
-_RESTLESS = 2.0  # mean squared change over the expected
 
 READING_GOOD, READING_JUMPED, READING_ABSENT, READING_FAILED = range(4)
 
 
 @kernel
-def _kind(axis, status: int) -> int:
+def _kind(p: RateChecks, axis, status: int) -> int:
     if status == SAMPLE_STUCK:
         if axis.raw == 0.0:
             return KIND_INTERMITTENT if axis.zeros >= _SPELLS else KIND_DEAD
         return KIND_STUCK if axis.came_by_jump != 0 else KIND_FROZEN
     if status == SAMPLE_SPIKY:
         # between spikes the samples are as they should be
-        return KIND_NOISY if axis.change > _RESTLESS else KIND_SPIKES
+        return KIND_NOISY if restless(p, axis) else KIND_SPIKES
     return KIND_NOISY if status == SAMPLE_NOISY else KIND_UNKNOWN
 
 
 @kernel
 def _accuse(p: RateChecks, axis, row, status: int, step: int) -> None:
     """Holds an axis for failed by its samples, or names anew what has failed already."""
-    kind = _kind(axis, status)
+    kind = _kind(p, axis, status)
     if row.held != 0:
         if row.kind != kind:
             rename(row, kind)
@@ -62,7 +61,7 @@ def _accuse(p: RateChecks, axis, row, status: int, step: int) -> None:
     elif status == SAMPLE_SPIKY:
         hold(row, kind, EVIDENCE_NOISE, axis.refused, MOST_REFUSED, step)
     else:
-        hold(row, kind, EVIDENCE_NOISE, axis.change, p.largest_change, step)
+        hold(row, kind, EVIDENCE_NOISE, axis.change / p.difference, p.largest_change, step)
 
 
 @kernel

@@ -26,6 +26,7 @@ _MOST_EQUAL = 1000
 _AGREEING = 4  # samples in a row make a jump
 _SHARE = 1.0 / 20.0  # of a new sample in averages
 _SIGMAS = 6.0
+_RESTLESS = 2.0  # mean squared change over that of noise
 # Squared differences of neighbours have their noise in common: an average of 39 of them is worth so many that do not.
 _DEGREES_OF_FREEDOM = (2.0 / _SHARE - 1.0) / 1.5
 MOST_REFUSED = 0.3
@@ -41,7 +42,7 @@ GYRO_AXIS = np.dtype(
         ("raw", np.float64),  # last sample [rad/s]
         ("good", np.float64),  # last that was used
         ("jump", np.float64),  # of the last jump
-        ("change", np.float64),  # [-] mean squared change over the expected
+        ("change", np.float64),  # [rad2/s2] mean squared change from sample to sample
         ("refused", np.float64),  # [-] share of the samples, averaged
         ("gap", np.float64),  # [s] since the last good sample
         ("equal", np.int64),  # samples in a row that were as the one before
@@ -115,16 +116,14 @@ PARAMETERS = table_of(RateChecks)
 
 def new_axes() -> np.ndarray:
     """Nothing seen on any axis."""
-    axes = np.zeros(3, GYRO_AXIS)
-    axes["change"] = 1.0
-    return axes
+    return np.zeros(3, GYRO_AXIS)
 
 
 @kernel
 def forget_samples(axis) -> None:
     """After a silence: the next sample is the first."""
     axis.seen = axis.equal = axis.agreeing = 0
-    axis.change, axis.refused, axis.gap = 1.0, 0.0, 0.0
+    axis.change = axis.refused = axis.gap = 0.0
 
 
 @kernel
@@ -177,6 +176,12 @@ def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
     axis.agreeing = 0
     axis.good, axis.gap = x, 0.0
     if abs(change) <= step:
-        torque = by_torque * dt
-        axis.change += _SHARE * (change * change / (p.difference + torque * torque) - axis.change)
-    return SAMPLE_NOISY if axis.change > p.largest_change else SAMPLE_GOOD
+        axis.change += _SHARE * (change * change - axis.change)
+    torque = by_torque * dt
+    return SAMPLE_NOISY if axis.change > p.largest_change * (p.difference + torque * torque) else SAMPLE_GOOD
+
+
+@kernel
+def restless(p: RateChecks, axis) -> bool:
+    """Whether samples change by more than noise also where they are no spikes."""
+    return axis.change > _RESTLESS * p.difference
