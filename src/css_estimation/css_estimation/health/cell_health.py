@@ -29,7 +29,7 @@ from css_estimation.health.cell_memory import (
     CellHealthState,
 )
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.health.cell_search import best_direction, cost, gather
+from css_estimation.health.cell_search import best_direction, cost, gather, refine
 from css_estimation.health.cell_signals import (
     LEAPING,
     NO_SIGNAL,
@@ -43,7 +43,7 @@ from css_estimation.health.cell_signals import (
 from css_estimation.health.sight import Sight
 from css_estimation.sun.direction_grid import mean_direction
 from css_estimation.sun.sun_heading import Sky
-from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
+from css_estimation.sun.sunline_filter import propagate
 from css_estimation.symmetric import isotropic, trace
 
 # The numbers of css_msgs/Health.
@@ -148,14 +148,16 @@ def _look(
     p: CellHealthParameters, state: CellHealthState, memory: CellHealthMemory, rate_known: bool, sky: Sky
 ) -> CellHealthState:
     """Judges all cells by what they read since the last look."""
-    means = memory.trusted
+    means = memory.means
     top = 0.0
     for i in range(means.shape[0]):
         cell = memory.cells[i]
         means[i] = cell.sum / cell.readings if cell.readings > 0 else math.nan
         cell.sum, cell.readings = 0.0, 0
-        if not math.isnan(means[i]) and cell.isolated == 0 and cell.out_of_range == 0.0:
-            top = max(top, means[i])
+        # a NaN compares false
+        if means[i] > top and _in_use(memory, i):
+            top = means[i]
+        memory.used[i] = means[i] if _in_use(memory, i) else math.nan
     window = state.window
     noise = _NOISE if rate_known else _NOISE_WITHOUT_RATE
     sun_b, covariance = propagate(state.sun_b, state.covariance, scale(1.0 / max(window, 1e-9), state.turn_b), window, noise)
@@ -201,17 +203,9 @@ def _look(
 
 
 @kernel
-def _in_use(memory: CellHealthMemory, i: int, mean: float) -> bool:
-    cell = memory.cells[i]
-    return not math.isnan(mean) and cell.isolated == 0 and cell.out_of_range == 0.0
-
-
-@kernel
-def _hide_others(memory: CellHealthMemory, means) -> None:
-    """Leaves NaN in the place of outputs that are not in use, for the search."""
-    for i in range(means.shape[0]):
-        if not _in_use(memory, i, means[i]):
-            means[i] = math.nan
+def _in_use(memory: CellHealthMemory, i: int) -> bool:
+    """Whether the direction rests on a cell."""
+    return memory.cells[i].isolated == 0 and memory.cells[i].out_of_range == 0.0
 
 
 @kernel
@@ -222,8 +216,7 @@ def _find(p, memory, means, since, sun_b, covariance, frame, light, rate_known):
             memory.grid[g] = 0.0
         frame = IDENTITY
     kept = 1.0 if rate_known else 0.5
-    _hide_others(memory, means)
-    gather(p, memory, means, frame, light, kept)
+    gather(p, memory, memory.used, frame, light, kept)
     mean_n, variance = mean_direction(memory.grid)
     if since >= _FIRST_LOOKS and (variance < _SPOT or since > _LONGEST_SEARCH):
         found = frame
@@ -243,7 +236,7 @@ def _follow(p, memory, means, phase, since, lost, sun_b, covariance, light, wind
     support = against = lit_ones = 0
     ratio = 0.0
     for i in range(means.shape[0]):
-        if not _in_use(memory, i, means[i]):
+        if math.isnan(memory.used[i]):
             continue
         e = expected(p, i, sun_b, covariance, light)
         c = contradiction(p, e, means[i])
@@ -257,25 +250,16 @@ def _follow(p, memory, means, phase, since, lost, sun_b, covariance, light, wind
     fades = support == 0 and lit_ones > 0 and ratio < _FADED
     prior_b, prior_covariance = sun_b, covariance
     settled = phase == PHASE_SETTLED
-    # update by those that do not contradict
+    if not fades:
+        sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, p.gate if settled else 2.0 * p.gate)
     ratio_sum = ratio_weight = 0.0
     for i in range(means.shape[0]):
-        if not _in_use(memory, i, means[i]) or fades:
-            continue
-        cell = p.layout.cells[i]
         e = expected(p, i, prior_b, prior_covariance, light)
-        c = abs(contradiction(p, e, means[i]))
-        if c > (p.gate if settled else 2.0 * p.gate):
-            continue
-        bright = means[i] > _BRIGHT * light
-        if bright or (e.sight == SEEN and means[i] > _DEAD):
-            variance = p.floor + p.share * means[i] * means[i] + _EARTH_ERROR * _EARTH_ERROR
-            output = means[i] / light
-            sun_b, covariance, _ = update_cell(sun_b, covariance, (cell.nx, cell.ny, cell.nz), output, variance)
-        if e.sight == SEEN and bright:
+        # a NaN compares false
+        sees = e.sight == SEEN and memory.used[i] > _BRIGHT * light
+        if sees and abs(contradiction(p, e, means[i])) <= p.gate:
             ratio_sum += means[i] * e.high
             ratio_weight += e.high * e.high
-    sun_b, covariance = constrain(sun_b, prior_b, covariance, _LARGEST_VARIANCE)
     if ratio_weight > 0.0:
         now = light * ratio_sum / ratio_weight
         light += min(1.0, window / _LIGHT_MEMORY) * (min(max(now, 0.5), 1.3) - light)
@@ -286,11 +270,10 @@ def _follow(p, memory, means, phase, since, lost, sun_b, covariance, light, wind
     if phase == PHASE_SETTLED:
         beyond = _score(p, memory, means, prior_b, prior_covariance, light, window, step, fades, support)
         if beyond > 0:
-            _hide_others(memory, means)
-            here = cost(p, means, prior_b, prior_covariance, light)
+            here = cost(p, memory.used, prior_b, prior_covariance, light)
             worth = _WORTH if rate_known else 0.0
             there, best = best_direction(
-                p, means, light, prior_b, 0.5 * trace(prior_covariance) + p.heading, worth
+                p, memory.used, light, prior_b, 0.5 * trace(prior_covariance) + p.heading, worth
             )
             if there + _BETTER < here:
                 _clear_scores(memory)

@@ -52,6 +52,8 @@ class CellHealthMemory(NamedTuple):
 
     cells: np.ndarray  # (N,) of WATCHED
     grid: np.ndarray  # (DIRECTIONS,) logarithms of the weights of directions to the Sun
+    means: np.ndarray  # (N,) outputs since the last look
+    used: np.ndarray  # (N,) those of them that the direction rests on, NaN for others
     trusted: np.ndarray  # (N,) outputs of this cycle, NaN for those that are left out
 
 
@@ -80,4 +82,4 @@ def new_memory(cells: int) -> CellHealthMemory:
     """Nothing read yet."""
     watched = np.zeros(cells, WATCHED)
     watched["first_step"] = -1
-    return CellHealthMemory(watched, np.zeros(DIRECTIONS), np.zeros(cells))
+    return CellHealthMemory(watched, np.zeros(DIRECTIONS), *(np.zeros(cells) for _ in range(3)))

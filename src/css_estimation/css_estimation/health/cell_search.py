@@ -9,13 +9,19 @@ import math
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, dot, multiply
-from css_estimation.health.cell_expectation import contradiction, expected
+from css_estimation.health.cell_expectation import SEEN, contradiction, expected
 from css_estimation.health.cell_memory import DIRECTIONS, CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.direction_grid import direction
+from css_estimation.sun.sunline_filter import constrain, update_cell
 from css_estimation.symmetric import Symmetric, isotropic
 
 _HALF_WAY = 0.08  # [rad] from one direction to the next
+_REFINEMENTS = 3
+_DEAD = 0.05
+_BRIGHT = 0.45  # of the light: a cell above it sees the Sun, whatever is predicted
+_EARTH_ERROR = 0.1  # of an output, 1 sigma
+_LARGEST_VARIANCE = 1.0  # [rad^2]
 
 
 @kernel
@@ -26,6 +32,26 @@ def cost(p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, l
         if not math.isnan(outputs[i]):
             total += abs(contradiction(p, expected(p, i, sun_b, covariance, light), outputs[i]))
     return total
+
+
+@kernel
+def refine(
+    p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, light: float, gate: float
+) -> tuple[Vec3, Symmetric]:
+    """Direction and covariance after the cells that see the Sun and do not contradict it by more than `gate`."""
+    prior_b, prior_covariance = sun_b, covariance
+    for i in range(outputs.shape[0]):
+        if math.isnan(outputs[i]):
+            continue
+        e = expected(p, i, prior_b, prior_covariance, light)
+        if abs(contradiction(p, e, outputs[i])) > gate:
+            continue
+        if outputs[i] > _BRIGHT * light or (e.sight == SEEN and outputs[i] > _DEAD):
+            cell = p.layout.cells[i]
+            variance = p.floor + p.share * outputs[i] * outputs[i] + _EARTH_ERROR * _EARTH_ERROR
+            normal_b = (cell.nx, cell.ny, cell.nz)
+            sun_b, covariance, _ = update_cell(sun_b, covariance, normal_b, outputs[i] / light, variance)
+    return constrain(sun_b, prior_b, covariance, _LARGEST_VARIANCE)
 
 
 @kernel
@@ -56,4 +82,9 @@ def best_direction(
         total = cost(p, outputs, d, covariance, light) + min(away * away / variance, worth)
         if total < least:
             least, best = total, d
-    return least, best
+    # as sure as the one that is followed, so that what contradicts it counts as much
+    best_covariance = covariance
+    for _ in range(_REFINEMENTS):
+        best, best_covariance = refine(p, outputs, best, covariance, light, 2.0 * p.gate)
+    angle = math.acos(min(1.0, max(-1.0, dot(best, sun_b))))
+    return cost(p, outputs, best, best_covariance, light) + min(angle * angle / variance, worth), best
