@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the spacecraft thinks of its own sensors: which are held for failed, and what estimators are given instead."""
+"""Which sensors can be trusted: what stands between them and every Sun estimator."""

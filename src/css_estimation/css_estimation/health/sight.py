@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Sun as the cells alone show it: what gyro and magnetometer are held against."""
+"""The Sun as the cells together see it, apart from any estimator."""
 
 from typing import NamedTuple
 
@@ -7,12 +7,8 @@ from css_common.vectors import Vec3
 
 
 class Sight(NamedTuple):
-    """Direction to the Sun without any help of gyro and magnetometer, of the last cycle."""
+    """After the last look."""
 
-    sun_b: Vec3  # [-] unit vector
+    sun_b: Vec3
     variance: float  # [rad^2] per axis across the Sun line
     known: bool
-
-
-UNSEEN = Sight((0.0, 0.0, 0.0), 0.0, False)
-"""No Sun in sight."""
