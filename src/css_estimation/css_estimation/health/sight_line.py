@@ -22,7 +22,7 @@ from css_estimation.health.sight import Sight
 
 _SHARE = 1.0 / 20.0  # of a new cycle in the measured jitter
 _SIGMAS = 6.0  # beyond which a change is a jump
-_LONGEST_WITHOUT = 5.0  # [s] without sight that a block lives through
+_LONGEST_WITHOUT = 2.0  # [s] without sight that a block lives through
 
 
 class SightLineParameters(NamedTuple):
@@ -107,15 +107,15 @@ def follow_sight(
         return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
     behind_b = across(sight.sun_b, subtract(sight.sun_b, line.vector_b))
     jitter = state.jitter
-    if state.unseen == 0.0:
-        change = subtract(behind_b, state.behind_b)
-        # two axes, each the difference of two samples; none is taken for noisier than the sight says
-        moved = dot(change, change)
-        noise = sight.variance if jitter < 0.0 else jitter
-        if moved > largest_error * largest_error * dt * dt + _SIGMAS * _SIGMAS * 2.0 * noise:
-            return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
-        seen = min(0.25 * moved, sight.variance)
-        jitter = seen if jitter < 0.0 else jitter + _SHARE * (seen - jitter)
+    change = subtract(behind_b, state.behind_b)
+    # two axes, each the difference of two samples; none is taken for noisier than the sight says
+    moved = dot(change, change)
+    noise = sight.variance if jitter < 0.0 else jitter
+    wrong = largest_error * (state.unseen + dt)
+    if moved > wrong * wrong + _SIGMAS * _SIGMAS * 2.0 * noise:
+        return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
+    seen = min(0.25 * moved, sight.variance)
+    jitter = seen if jitter < 0.0 else jitter + _SHARE * (seen - jitter)
     return SightLine(line, behind_b, jitter, 0.0), behind_b
 
 

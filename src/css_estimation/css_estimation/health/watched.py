@@ -11,21 +11,28 @@ from typing import Any, NamedTuple
 from css_common.declared import builder
 from css_common.schema import Values
 from css_common.vectors import Vec3
-from css_estimation.health import cell_health, cell_memory, cell_options
-from css_estimation.health.cell_health import watch_cells
+from css_estimation.health import aiding_health, cell_health, cell_memory, cell_options
+from css_estimation.health.aiding_health import (
+    AidingHealthMemory,
+    AidingHealthParameters,
+    AidingHealthState,
+    check_aiding,
+)
+from css_estimation.health.cell_health import fresh_sight, watch_cells
 from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun import heading_dispatch
-from css_estimation.sun.sun_heading import RATE_NONE, SunHeading
+from css_estimation.sun.sun_heading import RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import elapsed
 
-PARAMETERS = (ENABLED, *cell_options.PARAMETERS)
+PARAMETERS = (ENABLED, *cell_options.PARAMETERS, *aiding_health.PARAMETERS)
 _cell_parameters = builder(CellHealthParameters)
 
 
 class Watched(NamedTuple):
     """Parameters."""
 
+    aiding: AidingHealthParameters
     cells: CellHealthParameters
     own: Any  # of the algorithm
 
@@ -33,6 +40,7 @@ class Watched(NamedTuple):
 class WatchedState(NamedTuple):
     """Carried from cycle to cycle."""
 
+    aiding: AidingHealthState
     cells: CellHealthState
     omega_bn_b: Vec3  # [rad/s] of the last heading
     rate_known: bool
@@ -42,6 +50,7 @@ class WatchedState(NamedTuple):
 class WatchedMemory(NamedTuple):
     """Advanced in place."""
 
+    aiding: AidingHealthMemory
     cells: CellHealthMemory
     own: Any
 
@@ -49,32 +58,57 @@ class WatchedMemory(NamedTuple):
 def watched_parameters(algorithm: Any, values: Values) -> Any:
     """Parameters of an algorithm, behind the health of its sensors unless that is switched off."""
     own = algorithm.parameters(values)
-    return Watched(_cell_parameters(values), own) if values[ENABLED] else own
+    if not values[ENABLED]:
+        return own
+    return Watched(aiding_health.parameters(values), _cell_parameters(values), own)
 
 
 def initial_state(algorithm: Any, p: Any) -> Any:
     """State for parameters of `watched_parameters`."""
     if not isinstance(p, Watched):
         return algorithm.initial_state(p)
-    return WatchedState(cell_health.initial_state(), (0.0, 0.0, 0.0), False, algorithm.initial_state(p.own))
+    return WatchedState(
+        aiding_health.initial_state(p.aiding),
+        cell_health.initial_state(),
+        (0.0, 0.0, 0.0),
+        False,
+        algorithm.initial_state(p.own),
+    )
 
 
 def initial_memory(algorithm: Any, p: Any) -> Any:
     """Memory for parameters of `watched_parameters`."""
     if not isinstance(p, Watched):
         return algorithm.initial_memory(p)
-    return WatchedMemory(cell_memory.new_memory(len(p.cells.layout.cells)), algorithm.initial_memory(p.own))
+    return WatchedMemory(
+        aiding_health.initial_memory(p.aiding),
+        cell_memory.new_memory(len(p.cells.layout.cells)),
+        algorithm.initial_memory(p.own),
+    )
 
 
 def watched_heading(p, state, memory, dt, voltages, aiding):
     """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
+    dt_known = elapsed(dt)
+    aiding_state, trusted = check_aiding(
+        p.aiding, state.aiding, memory.aiding, dt_known, aiding, fresh_sight(state.cells)
+    )
+    aiding = Aiding(
+        trusted.gyro_b,
+        trusted.gyro_valid,
+        trusted.field_b,
+        trusted.field_valid,
+        aiding.wheel_speeds,
+        aiding.wheels_valid,
+        aiding.sky,
+    )
     gyro_speaks = aiding.gyro_valid
     omega_bn_b = aiding.gyro_b if gyro_speaks else state.omega_bn_b
     cells = watch_cells(
         p.cells,
         state.cells,
         memory.cells,
-        elapsed(dt),
+        dt_known,
         voltages,
         omega_bn_b,
         gyro_speaks or state.rate_known,
@@ -94,6 +128,6 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         said.eclipse,
         said.mode,
         cells.isolated,
-        0,
+        trusted.left,
     )
-    return WatchedState(cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
+    return WatchedState(aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
