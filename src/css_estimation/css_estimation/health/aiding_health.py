@@ -52,6 +52,7 @@ class AidingHealthMemory(NamedTuple):
     fits: np.ndarray  # of `gyro_fit`
     gyro_verdicts: np.ndarray  # (3,) of VERDICT
     field_verdicts: np.ndarray  # (3,) of VERDICT
+    no_speeds: np.ndarray  # (0,) of wheels that nobody reckons with
 
 
 def initial_state(p: AidingHealthParameters) -> AidingHealthState:
@@ -61,7 +62,7 @@ def initial_state(p: AidingHealthParameters) -> AidingHealthState:
 
 def initial_memory(p: AidingHealthParameters) -> AidingHealthMemory:
     """Nothing held for failed."""
-    return AidingHealthMemory(new_axes(), new_fits(), new_verdicts(SORT_GYRO, 3), new_verdicts(SORT_MAGNETOMETER, 3))
+    return AidingHealthMemory(new_axes(), new_fits(), new_verdicts(SORT_GYRO, 3), new_verdicts(SORT_MAGNETOMETER, 3), np.zeros(0))
 
 
 @kernel

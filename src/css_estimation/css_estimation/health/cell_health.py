@@ -89,13 +89,6 @@ def sight(state: CellHealthState) -> Sight:
     return Sight(state.sun_b, 0.5 * trace(state.covariance), state.phase == PHASE_SETTLED)
 
 
-@kernel
-def fresh_sight(state: CellHealthState) -> Sight:
-    """The same, known in the cycle of a look alone: between looks the direction stands still, and the Sun does not."""
-    seen = sight(state)
-    return Sight(seen.sun_b, seen.variance, seen.known and state.window == 0.0)
-
-
 def initial_state() -> CellHealthState:
     """Nothing seen yet."""
     zero = (0.0, 0.0, 0.0)

@@ -11,19 +11,21 @@ from typing import Any, NamedTuple
 from css_common.declared import builder
 from css_common.schema import Values
 from css_common.vectors import Vec3
-from css_estimation.health import aiding_health, cell_health, cell_memory, cell_options
+from css_estimation.health import aiding_health, cell_health, cell_memory, cell_options, gyroless_sight
 from css_estimation.health.aiding_health import (
     AidingHealthMemory,
     AidingHealthParameters,
     AidingHealthState,
     check_aiding,
 )
-from css_estimation.health.cell_health import fresh_sight, watch_cells
+from css_estimation.health.cell_health import watch_cells
 from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState
+from css_estimation.health.gyroless_sight import look
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun import heading_dispatch
 from css_estimation.sun.sun_heading import RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import elapsed
+from css_estimation.sun.sunline_ekf import EkfParameters, EkfState
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS, *aiding_health.PARAMETERS)
 _cell_parameters = builder(CellHealthParameters)
@@ -32,6 +34,7 @@ _cell_parameters = builder(CellHealthParameters)
 class Watched(NamedTuple):
     """Parameters."""
 
+    sight: EkfParameters
     aiding: AidingHealthParameters
     cells: CellHealthParameters
     own: Any  # of the algorithm
@@ -40,6 +43,7 @@ class Watched(NamedTuple):
 class WatchedState(NamedTuple):
     """Carried from cycle to cycle."""
 
+    sight: EkfState
     aiding: AidingHealthState
     cells: CellHealthState
     omega_bn_b: Vec3  # [rad/s] of the last heading
@@ -60,7 +64,7 @@ def watched_parameters(algorithm: Any, values: Values) -> Any:
     own = algorithm.parameters(values)
     if not values[ENABLED]:
         return own
-    return Watched(aiding_health.parameters(values), _cell_parameters(values), own)
+    return Watched(gyroless_sight.gyroless_parameters(values), aiding_health.parameters(values), _cell_parameters(values), own)
 
 
 def initial_state(algorithm: Any, p: Any) -> Any:
@@ -68,6 +72,7 @@ def initial_state(algorithm: Any, p: Any) -> Any:
     if not isinstance(p, Watched):
         return algorithm.initial_state(p)
     return WatchedState(
+        gyroless_sight.initial_state(p.sight),
         aiding_health.initial_state(p.aiding),
         cell_health.initial_state(),
         (0.0, 0.0, 0.0),
@@ -90,9 +95,11 @@ def initial_memory(algorithm: Any, p: Any) -> Any:
 def watched_heading(p, state, memory, dt, voltages, aiding):
     """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
     dt_known = elapsed(dt)
-    aiding_state, trusted = check_aiding(
-        p.aiding, state.aiding, memory.aiding, dt_known, aiding, fresh_sight(state.cells)
+    # by the outputs of the last cycle: those of this one are judged with the gyro
+    sight_state, sight = look(
+        p.sight, state.sight, dt_known, memory.cells.trusted, memory.aiding.no_speeds, aiding.sky
     )
+    aiding_state, trusted = check_aiding(p.aiding, state.aiding, memory.aiding, dt_known, aiding, sight)
     aiding = Aiding(
         trusted.gyro_b,
         trusted.gyro_valid,
@@ -130,4 +137,4 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         cells.isolated,
         trusted.left,
     )
-    return WatchedState(aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
+    return WatchedState(sight_state, aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
