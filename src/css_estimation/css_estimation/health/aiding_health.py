@@ -14,7 +14,7 @@ from css_estimation.health.gyro_fit import new_fits
 from css_estimation.health.gyro_health import check_gyro
 from css_estimation.health.gyro_state import GyroHealthParameters, GyroState
 from css_estimation.health.rate_checks import new_axes
-from css_estimation.health.sight import Sight
+from css_estimation.health.gyroless_sight import Glimpse
 from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO, Aiding
 
 
@@ -72,7 +72,7 @@ def check_aiding(
     memory: AidingHealthMemory,
     dt: float,
     aiding: Aiding,
-    sight: Sight,
+    sight: Glimpse,
 ) -> tuple[AidingHealthState, Trusted]:
     """State, and what can be trusted.
 

@@ -7,7 +7,7 @@ jumps, until the line has moved through the body. Without the Sun nothing is jud
 
 from css_common.health import EVIDENCE_DEAD, EVIDENCE_NOISE, EVIDENCE_SUN, KIND_SILENT, hold
 from css_common.kernel import kernel
-from css_common.vectors import Vec3, add, scale
+from css_common.vectors import Vec3, add, matmul, multiply, scale
 from css_estimation.health.gyro_bias import corrected
 from css_estimation.health.gyro_judgement import heed_jumps, judge, release_all
 from css_estimation.health.gyro_samples import READING_ABSENT, READING_FAILED, READING_JUMPED, check_samples
@@ -22,12 +22,12 @@ from css_estimation.health.gyro_state import (
 )
 from css_estimation.health.rate_checks import forget_samples
 from css_estimation.health.reference_line import off_the_gyro
-from css_estimation.health.sight import Sight
+from css_estimation.health.gyroless_sight import Glimpse
 from css_estimation.health.sight_line import (
     begin_again,
-    block_variance,
     follow_sight,
     interrupted,
+    whitening,
 )
 
 
@@ -53,26 +53,26 @@ def _not_given(
 
 @kernel
 def _compare_with_sun(
-    p: GyroHealthParameters, state: GyroState, fits, verdicts, step: int, sight: Sight
+    p: GyroHealthParameters, state: GyroState, fits, verdicts, step: int, sight: Glimpse
 ) -> GyroState:
     """Follows the Sun line through one cycle, and judges the gyro at the end of a block."""
     r = state.readings
     # the sight is that of the last cycle
     rate_b = scale(0.5, add(r.before_b, r.rate_b))
     opinion = state.opinion
-    line, behind_b = follow_sight(state.sight, r.dt, rate_b, opinion.bias.bias_b, p.largest_error, sight)
+    line, behind_b = follow_sight(p.sight, state.sight, r.dt, rate_b, opinion.bias.bias_b, p.largest_error, sight)
     if sight.known and line.line.time >= p.block:
-        variance = block_variance(p.sight, line, sight, r.dt, p.checks.noise * p.checks.noise)
+        white = whitening(p.sight, line, sight, r.dt, p.checks.noise * p.checks.noise)
         block = line.line
         opinion = judge(
             p,
             opinion,
             fits,
             verdicts,
-            block.by_bias,
-            block.by_scale,
-            off_the_gyro(block, behind_b),
-            variance,
+            matmul(white, block.by_bias),
+            matmul(white, block.by_scale),
+            multiply(white, off_the_gyro(block, behind_b)),
+            1.0,
             2,
             block.time,
             EVIDENCE_SUN,
@@ -93,7 +93,7 @@ def check_gyro(
     step: int,
     gyro_b: Vec3,
     valid: bool,
-    sight: Sight,
+    sight: Glimpse,
 ) -> tuple[GyroState, Vec3, bool, bool]:
     """One cycle.
 

@@ -20,6 +20,7 @@ from css_estimation.health.gyro_state import (
 
 _SIGN_TOLD = 4.0
 _FEWEST_BLOCKS = 10  # in a trial
+_CONSISTENT = 1.5  # normalised innovation squared per degree of freedom with which a bias is believed
 _FEWEST_BIASED = 5  # that tell a bias: a single one is no evidence, however far it is off
 
 
@@ -124,6 +125,9 @@ def judge(
     if opinion.mode == GYRO_LEFT:
         return _try_again(p, now, fits, verdicts, shaped, evidence, step)
     if contradicted:
+        if not shaped and opinion.mode == GYRO_TRUSTED and bias.blocks < _FEWEST_BLOCKS * 2:
+            # what was learnt while the Sun was found is no evidence
+            return anew(p, fits, GYRO_TRUSTED, NO_SHAPE, now.trial_time)
         if not shaped:
             axis = _worst_axis(p, bias)
             _accuse(verdicts[axis], KIND_UNKNOWN, evidence, bias.nis, p.largest_nis, step)
@@ -157,7 +161,7 @@ def _try_again(
 def _go_on(p: GyroHealthParameters, now: Opinion, fits, verdicts, shaped: bool, evidence: int, step: int) -> Opinion:
     """The opinion of a gyro whose error is that of a bias at most."""
     beyond = significance(now.bias, p.usual_bias)
-    biased = beyond > p.threshold and now.bias.blocks >= _FEWEST_BIASED
+    biased = beyond > p.threshold and now.bias.blocks >= _FEWEST_BIASED and now.bias.nis < _CONSISTENT
     if now.mode == GYRO_TRUSTED:
         if shaped or biased:
             _accuse_biased(p, verdicts, now.bias, KIND_DRIFTING if shaped else KIND_BIAS, evidence, step)

@@ -16,13 +16,17 @@ from css_common.conversions import square_of_degrees
 from css_common.declared import given, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import real
-from css_common.vectors import Vec3, dot, scale, subtract
+from css_common.vectors import Mat3, Vec3, add, axes_across, cross, dot, scale, subtract
 from css_estimation.health.reference_line import NO_LINE, Line, begin_line, carry
-from css_estimation.health.sight import Sight
+from css_estimation.health.gyroless_sight import Glimpse
+from css_estimation.symmetric import Symmetric, product
 
 _SHARE = 1.0 / 20.0  # of a new cycle in the measured jitter
 _SIGMAS = 6.0  # beyond which a change is a jump
 _LONGEST_WITHOUT = 2.0  # [s] without sight that a block lives through
+# [rad^2] 2.5 deg: a larger variance is that of a direction which the cells of now do not tell; it is not a lasting
+# error, but will be gone with the next cell that sees the Sun
+_TOLD = math.radians(2.5) ** 2
 
 
 class SightLineParameters(NamedTuple):
@@ -34,12 +38,15 @@ class SightLineParameters(NamedTuple):
             "health.sight.error_deg",
             1.5,
             "deg",
-            "least lasting error of the sight, whatever it says of itself, per axis, 1 sigma",
+            "lasting error of the sight by cells that tell the direction, per axis, 1 sigma",
             low=0.0,
             high=45.0,
         ),
     )
     time: float = given(real("health.sight.time", 70.0, "s", "correlation time of its error", low=1.0, high=1e6))
+    settling: float = given(
+        real("health.sight.settling", 5.0, "s", "after a Sun is found, until it is used", low=0.0, high=1e4)
+    )
     angle: float = made(
         math.radians,
         real("health.sight.angle_deg", 50.0, "deg", "turn of the body after which it is another", low=1.0, high=1e6),
@@ -53,28 +60,31 @@ class SightLine(NamedTuple):
     """A block under way, and the white noise of the sight."""
 
     line: Line
+    covariance: Symmetric  # [rad2] of the sight that it began with
     behind_b: Vec3  # [rad] what the sight was off the carried line when it was last seen
-    jitter: float  # [rad2] per axis; -1: not measured yet
+    jitter: float  # [rad2] along the axis that is known best; -1: not measured yet
     unseen: float  # [s] since there was a sight
+    seen: float  # [s] since it was found
 
 
-NO_SIGHT_LINE = SightLine(NO_LINE, (0.0, 0.0, 0.0), -1.0, 0.0)
+_UNKNOWN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+NO_SIGHT_LINE = SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), -1.0, 0.0, 0.0)
 
 
 @kernel
 def interrupted(state: SightLine) -> SightLine:
-    """The block is given up; what is known of the noise stays."""
-    return SightLine(NO_LINE, (0.0, 0.0, 0.0), state.jitter, 0.0)
+    """The block is given up; what is known of the sight stays."""
+    return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, state.unseen, state.seen)
 
 
 @kernel
-def begin_again(state: SightLine, sight: Sight, bias_b: Vec3) -> SightLine:
+def begin_again(state: SightLine, sight: Glimpse, bias_b: Vec3) -> SightLine:
     """The next block, which begins with this sight.
 
     Args:
         bias_b: of the gyro, as far as it is known [rad/s].
     """
-    return SightLine(begin_line(sight.sun_b, bias_b), (0.0, 0.0, 0.0), state.jitter, 0.0)
+    return SightLine(begin_line(sight.sun_b, bias_b), sight.covariance, (0.0, 0.0, 0.0), state.jitter, 0.0, state.seen)
 
 
 @kernel
@@ -85,7 +95,7 @@ def across(direction: Vec3, v: Vec3) -> Vec3:
 
 @kernel
 def follow_sight(
-    state: SightLine, dt: float, rate_b: Vec3, bias_b: Vec3, largest_error: float, sight: Sight
+    p: SightLineParameters, state: SightLine, dt: float, rate_b: Vec3, bias_b: Vec3, largest_error: float, sight: Glimpse
 ) -> tuple[SightLine, Vec3]:
     """One cycle: the block, and what the sight is off the line that the gyro has carried [rad].
 
@@ -101,33 +111,67 @@ def follow_sight(
     if not sight.known:
         unseen = state.unseen + dt
         if unseen > _LONGEST_WITHOUT:
-            return interrupted(state), (0.0, 0.0, 0.0)
-        return SightLine(line, state.behind_b, state.jitter, unseen), (0.0, 0.0, 0.0)
+            return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, unseen, 0.0), (0.0, 0.0, 0.0)
+        return SightLine(line, state.covariance, state.behind_b, state.jitter, unseen, state.seen), (0.0, 0.0, 0.0)
     if not line.begun:
+        seen_for = state.seen + dt
+        if seen_for < p.settling:
+            return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, 0.0, seen_for), (0.0, 0.0, 0.0)
         return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
     behind_b = across(sight.sun_b, subtract(sight.sun_b, line.vector_b))
     jitter = state.jitter
     change = subtract(behind_b, state.behind_b)
-    # two axes, each the difference of two samples; none is taken for noisier than the sight says
-    moved = dot(change, change)
-    noise = sight.variance if jitter < 0.0 else jitter
+    (_, best, _), _ = axes_of(state.covariance, sight)
+    told = dot(best, product(sight.covariance, best))
+    noise = told if jitter < 0.0 else jitter
     wrong = largest_error * (state.unseen + dt)
-    if moved > wrong * wrong + _SIGMAS * _SIGMAS * 2.0 * noise:
+    if dot(change, change) > wrong * wrong + _SIGMAS * _SIGMAS * 2.0 * noise:
         return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
-    seen = min(0.25 * moved, sight.variance)
+    # the difference of two samples; none is taken for noisier than the sight says
+    seen = min(0.5 * dot(change, best) * dot(change, best), told)
     jitter = seen if jitter < 0.0 else jitter + _SHARE * (seen - jitter)
-    return SightLine(line, behind_b, jitter, 0.0), behind_b
+    return SightLine(line, state.covariance, behind_b, jitter, 0.0, state.seen), behind_b
 
 
 @kernel
-def block_variance(p: SightLineParameters, state: SightLine, sight: Sight, dt: float, rate_noise: float) -> float:
-    """Variance [rad2] per axis of what the sight of a good gyro is off at the end of a block.
+def axes_of(before: Symmetric, sight: Glimpse) -> tuple[Mat3, Vec3]:
+    """Axes across the Sun line (worse, better, along) of what two sights do not know, and variances along them [rad^2].
+
+    Args:
+        before: covariance of the earlier one, in b.
+        sight: the later.
+    """
+    now = sight.covariance
+    total = (
+        before[0] + now[0],
+        before[1] + now[1],
+        before[2] + now[2],
+        before[3] + now[3],
+        before[4] + now[4],
+        before[5] + now[5],
+    )
+    e1, e2 = axes_across(sight.sun_b)
+    a, b, c = dot(e1, product(total, e1)), dot(e1, product(total, e2)), dot(e2, product(total, e2))
+    angle = 0.5 * math.atan2(2.0 * b, a - c)
+    worse = add(scale(math.cos(angle), e1), scale(math.sin(angle), e2))
+    better = cross(sight.sun_b, worse)
+    variances = (dot(worse, product(total, worse)), dot(better, product(total, better)), 0.0)
+    return (worse, better, sight.sun_b), variances
+
+
+@kernel
+def whitening(p: SightLineParameters, state: SightLine, sight: Glimpse, dt: float, rate_noise: float) -> Mat3:
+    """What turns the difference at the end of a block [rad] into two numbers of variance one, for a good gyro.
 
     Args:
         rate_noise: variance of a sample of the gyro [rad2/s2].
     """
     line = state.line
-    lasting = max(sight.variance, p.floor)
-    wandered = 2.0 * lasting * (line.time / p.time + line.turn / p.angle)
-    white = sight.variance if state.jitter < 0.0 else state.jitter
-    return 2.0 * white + min(wandered, 2.0 * lasting) + rate_noise * dt * line.time
+    (worse, better, _), (larger, smaller, _) = axes_of(state.covariance, sight)
+    wandered = 2.0 * p.floor * min(line.time / p.time + line.turn / p.angle, 1.0)
+    usual = wandered + 2.0 * max(state.jitter, 0.0) + rate_noise * dt * line.time
+    return (
+        scale(1.0 / math.sqrt(usual + max(larger - 2.0 * _TOLD, 0.0)), worse),
+        scale(1.0 / math.sqrt(usual + max(smaller - 2.0 * _TOLD, 0.0)), better),
+        (0.0, 0.0, 0.0),
+    )
