@@ -117,14 +117,13 @@ def study_kernel(function: Callable[P, R]) -> "Kernel[P, R]":
     return _uncounted(function, _folder(study_hash(function.__module__)), _UNCOUNTED | {"nogil": True})
 
 
-def kernel_of(function: Callable[P, R], module: str) -> "Kernel[P, R]":
-    """Compiles a loop around kernels of another module, which it finds by the types of its arguments.
+def kernel_of(function: Callable[P, R], *modules: str) -> "Kernel[P, R]":
+    """Compiles a loop around kernels of other modules, which it finds by the types of its arguments.
 
-    Unlike that of a study, which may call any kernel there is, it has a folder for each such module.
+    Unlike that of a study, which may call any kernel there is, it has a folder for each set of such modules.
     """
-    return _uncounted(
-        function, _folder(hash_of(sources_of(function.__module__) | sources_of(module), _COMPILER)), _UNCOUNTED
-    )
+    sources = sources_of(function.__module__).union(*(sources_of(module) for module in modules))
+    return _uncounted(function, _folder(hash_of(sources, _COMPILER)), _UNCOUNTED)
 
 
 def outer_kernel(function: Callable[P, R]) -> "Kernel[P, R]":

@@ -73,6 +73,7 @@ def check_aiding(
     dt: float,
     aiding: Aiding,
     sight: Glimpse,
+    misfits: bool,
 ) -> tuple[AidingHealthState, Trusted]:
     """State, and what can be trusted.
 
@@ -80,6 +81,7 @@ def check_aiding(
         dt: [s] since the last cycle.
         aiding: as measured.
         sight: the Sun by the cells alone, of the last cycle.
+        misfits: the cells contradict a Sun line that the gyro leads.
     """
     gyro, gyro_b, gyro_valid, gyro_left = check_gyro(
         p.gyro,
@@ -92,6 +94,7 @@ def check_aiding(
         aiding.gyro_b,
         aiding.gyro_valid,
         sight,
+        misfits,
     )
     left = LEFT_GYRO if gyro_left else 0
     trusted = Trusted(gyro_b, gyro_valid, aiding.field_b, aiding.field_valid, left)

@@ -53,7 +53,7 @@ def _not_given(
 
 @kernel
 def _compare_with_sun(
-    p: GyroHealthParameters, state: GyroState, fits, verdicts, step: int, sight: Glimpse
+    p: GyroHealthParameters, state: GyroState, fits, verdicts, step: int, sight: Glimpse, misfits: bool
 ) -> GyroState:
     """Follows the Sun line through one cycle, and judges the gyro at the end of a block."""
     r = state.readings
@@ -75,6 +75,7 @@ def _compare_with_sun(
             1.0,
             2,
             block.time,
+            misfits,
             EVIDENCE_SUN,
             step,
         )
@@ -94,6 +95,7 @@ def check_gyro(
     gyro_b: Vec3,
     valid: bool,
     sight: Glimpse,
+    misfits: bool,
 ) -> tuple[GyroState, Vec3, bool, bool]:
     """One cycle.
 
@@ -105,6 +107,7 @@ def check_gyro(
         step: number of the cycle.
         gyro_b, valid: the reading [rad/s], and whether there is one.
         sight: of the last cycle.
+        misfits: the cells contradict a Sun line that the gyro leads.
 
     Returns:
         State; rate to go on with [rad/s]; whether there is one; whether the gyro is left.
@@ -126,7 +129,7 @@ def check_gyro(
     if r.silent > 0.0 or not r.spoken:
         line = interrupted(line)
     else:
-        state = _compare_with_sun(p, GyroState(r, opinion, line), fits, verdicts, step, sight)
+        state = _compare_with_sun(p, GyroState(r, opinion, line), fits, verdicts, step, sight, misfits)
         opinion, line = state.opinion, state.sight
     readings = Readings(rate_b, r.rate_b if r.spoken else rate_b, dt, True, 0.0)
     if opinion.mode == GYRO_CORRECTED:

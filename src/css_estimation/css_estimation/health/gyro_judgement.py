@@ -79,6 +79,7 @@ def judge(
     variance: float,
     degrees: int,
     time: float,
+    misfits: bool,
     evidence: int,
     step: int,
 ) -> Opinion:
@@ -90,6 +91,7 @@ def judge(
         by_bias, by_scale: F and G of `reference_line`.
         difference, variance, degrees: as of `gyro_bias.learn`.
         time: [s] of the block.
+        misfits: the cells too contradict a Sun line that the gyro leads; without that a gyro that is trusted stays so.
         evidence: `EVIDENCE_*` of the line.
         step: number of the cycle.
     """
@@ -125,14 +127,14 @@ def judge(
     if opinion.mode == GYRO_LEFT:
         return _try_again(p, now, fits, verdicts, shaped, evidence, step)
     if contradicted:
-        if not shaped and opinion.mode == GYRO_TRUSTED and bias.blocks < _FEWEST_BLOCKS * 2:
+        if opinion.mode == GYRO_TRUSTED and not misfits:
             # what was learnt while the Sun was found is no evidence
             return anew(p, fits, GYRO_TRUSTED, NO_SHAPE, now.trial_time)
         if not shaped:
             axis = _worst_axis(p, bias)
             _accuse(verdicts[axis], KIND_UNKNOWN, evidence, bias.nis, p.largest_nis, step)
         return leave(p, now, fits, now.claim)
-    return _go_on(p, now, fits, verdicts, shaped, evidence, step)
+    return _go_on(p, now, fits, verdicts, shaped, misfits, evidence, step)
 
 
 @kernel
@@ -158,14 +160,17 @@ def _try_again(
 
 
 @kernel
-def _go_on(p: GyroHealthParameters, now: Opinion, fits, verdicts, shaped: bool, evidence: int, step: int) -> Opinion:
+def _go_on(
+    p: GyroHealthParameters, now: Opinion, fits, verdicts, shaped: bool, misfits: bool, evidence: int, step: int
+) -> Opinion:
     """The opinion of a gyro whose error is that of a bias at most."""
     beyond = significance(now.bias, p.usual_bias)
     biased = beyond > p.threshold and now.bias.blocks >= _FEWEST_BIASED and now.bias.nis < _CONSISTENT
     if now.mode == GYRO_TRUSTED:
-        if shaped or biased:
+        wrong = misfits and (shaped or biased)
+        if wrong:
             _accuse_biased(p, verdicts, now.bias, KIND_DRIFTING if shaped else KIND_BIAS, evidence, step)
-        mode = GYRO_CORRECTED if shaped or biased else GYRO_TRUSTED
+        mode = GYRO_CORRECTED if wrong else GYRO_TRUSTED
         return Opinion(mode, now.bias, now.drift, now.fit_time, 0.0, False, NO_SHAPE, now.trial_time)
     if beyond > p.agreement:
         return Opinion(GYRO_CORRECTED, now.bias, now.drift, now.fit_time, 0.0, False, NO_SHAPE, now.trial_time)

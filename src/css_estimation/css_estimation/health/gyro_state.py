@@ -85,6 +85,16 @@ class GyroHealthParameters(NamedTuple):
         real("health.gyro.return_sigmas", 3.0, "-", "within so many it is right again", low=1.0, high=100.0),
     )
     largest_nis: float = computed(lambda values: gamma_quantile(_NIS_DEGREES, _SIGMAS))
+    largest_misfit: float = given(
+        real(
+            "health.gyro.misfit",
+            1.0,
+            "-",
+            "squared sigmas per cell, averaged, beyond which cells contradict a Sun line that the gyro leads",
+            low=0.01,
+            high=1e4,
+        )
+    )
     block: float = given(
         real("health.gyro.block", 1.0, "s", "time after which gyro and Sun line are compared", low=1e-3, high=100.0)
     )

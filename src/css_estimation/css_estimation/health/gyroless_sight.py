@@ -16,28 +16,36 @@ from css_common.vectors import Vec3
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_ekf
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky
-from css_estimation.sun.sun_tracking import USE_GYRO
+from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_ekf import EkfParameters, EkfState
-from css_estimation.symmetric import Symmetric, trace
+from css_estimation.symmetric import Symmetric, add_outer, isotropic, trace
 
 _SURE = 0.01  # [rad^2] along the better axis: 6 deg
 # Where one or two cells see the Sun, the direction that they do not tell has to get uncertain as fast as a body turns
 # that nothing is known of.
-_INSTEAD = {"process_sigma": 0.05}
+_GYROLESS = {"process_sigma": 0.03}
+# A filter that follows the gyro through ten seconds before cells move it, and thinks well of cells.
+_GYRO_LED = {"process_sigma": 0.0015, "cell_sigma": 0.05}
+_MEMORY = 5.0  # [s] of which misfits are averaged
+_SETTLING = 5.0  # [s] in which a Sun that was found may still move
+_LONG = 10.0  # [s] after which a filter has shown that it fits, or not
+_FIT = 0.5
+_STRIKES = 2
+_FOUND = 0.1  # [rad^2] of a Sun that is found: 18 deg
+_PATIENCE = 30.0  # [s] of light
+_ALONG = 1e-4  # [rad^2] along the Sun line
 _NO_RATE = (0.0, 0.0, 0.0)
 
 
-class _WithoutGyro:
-    """Values of an estimator, with the defaults of the filter for what it does not declare, and no gyro."""
+class _Instead:
+    """Values of an estimator, with defaults of the filter for what it does not declare, and some others instead."""
 
-    def __init__(self, values: Values) -> None:
-        self._values = values
+    def __init__(self, values: Values, **instead: Any) -> None:
+        self._values, self._instead = values, instead
 
     def __getitem__(self, parameter: Parameter[Any]) -> Any:
-        if parameter is USE_GYRO:
-            return False
-        if parameter.name in _INSTEAD:
-            return _INSTEAD[parameter.name]
+        if parameter.name in self._instead:
+            return self._instead[parameter.name]
         return self._values[parameter] if parameter in self._values else _converted(parameter)
 
     def __contains__(self, parameter: Parameter[Any]) -> bool:
@@ -52,13 +60,26 @@ def _converted(parameter: Parameter[Any]) -> Any:
 
 
 def gyroless_parameters(values: Values) -> EkfParameters:
-    """Of the filter, for the cells of a mission."""
-    return built(EkfParameters, _WithoutGyro(values))  # type: ignore[arg-type]
+    """Of the filter without a gyro, for the cells of a mission."""
+    return built(EkfParameters, _Instead(values, use_gyro=False, **_GYROLESS))  # type: ignore[arg-type]
 
 
-def initial_state(p: EkfParameters) -> EkfState:
+def gyro_led_parameters(values: Values) -> EkfParameters:
+    """Of the filter that believes the gyro, for the cells of a mission."""
+    return built(EkfParameters, _Instead(values, use_gyro=True, **_GYRO_LED))  # type: ignore[arg-type]
+
+
+class Gyroless(NamedTuple):
+    """The filter without a gyro."""
+
+    filter: EkfState
+    found: bool  # it has begun where all cells together show the Sun
+    waited: float  # [s] that it has seen light, until then
+
+
+def initial_state(p: EkfParameters) -> Gyroless:
     """Waiting for light."""
-    return sunline_ekf.initial_state(p)
+    return Gyroless(sunline_ekf.initial_state(p), False, 0.0)
 
 
 class Glimpse(NamedTuple):
@@ -79,19 +100,100 @@ def glimpse_of(sight: Sight) -> Glimpse:
 
 
 @kernel
-def look(p: EkfParameters, state: EkfState, dt: float, voltages, speeds, sky: Sky) -> tuple[EkfState, Glimpse]:
+def look(
+    p: EkfParameters, state: Gyroless, dt: float, voltages, speeds, sky: Sky, found: bool, found_b: Vec3
+) -> tuple[Gyroless, Glimpse]:
     """State and sight after one cycle.
+
+    What the filter begins with by itself, where few cells see the Sun, may be far off and not know it: it begins anew
+    where the Sun is found over the whole sphere, or is believed after long.
 
     Args:
         dt: [s] since the last cycle.
         voltages: (N,) [-] of cells that can be trusted, NaN for all others.
         speeds: (0,) of no wheels.
         sky: of the flight's models.
+        found, found_b: the Sun is found by all cells together, and where.
     """
+    before = state.filter
+    if found and not state.found:
+        before = _begun(before, found_b, isotropic(_FOUND))
     unaided = Aiding(_NO_RATE, False, _NO_RATE, False, speeds, False, sky)
-    state, heading = sunline_ekf.step(p, state, None, dt, voltages, unaided)
-    known = heading.validity == VALIDITY_VALID and state.started
-    return state, Glimpse(heading.sun_b, state.covariance, known and least_across(state.covariance) < _SURE)
+    after, heading = sunline_ekf.step(p, before, None, dt, voltages, unaided)
+    lit = heading.validity == VALIDITY_VALID and after.started
+    waited = state.waited + dt if lit else state.waited
+    known = lit and (found or state.found or waited > _PATIENCE) and least_across(after.covariance) < _SURE
+    return Gyroless(after, found or state.found, waited), Glimpse(heading.sun_b, after.covariance, known)
+
+
+@kernel
+def _begun(state: EkfState, sun_b: Vec3, covariance: Symmetric) -> EkfState:
+    t = state.tracking
+    tracking = TrackingState(sun_b, t.omega_bn_b, t.age, t.validity, t.rate_source, t.field, t.eclipse, t.light)
+    return EkfState(True, covariance, tracking)
+
+
+class Led(NamedTuple):
+    """A Sun line filter that believes the gyro, begun where the cells alone saw the Sun."""
+
+    filter: EkfState
+    misfit: float  # [-] normalised innovation squared per cell, averaged
+    since: float  # [s] since it was begun; negative: until it is, while the Sun is in sight
+    strikes: int  # how often it has ended in misfits; it begins with 1 once it has long fitted
+
+
+def initial_led(p: EkfParameters) -> Led:
+    """Waiting for a sight."""
+    return Led(sunline_ekf.initial_state(p), 0.0, -_SETTLING, 0)
+
+
+@kernel
+def contradicts(led: Led) -> bool:
+    """Whether gyro and cells contradict one another, and not for a bad beginning."""
+    return led.strikes >= _STRIKES
+
+
+@kernel
+def _begin(led: Led, glimpse: Glimpse, strikes: int) -> Led:
+    covariance = add_outer(glimpse.covariance, _ALONG, glimpse.sun_b)
+    return Led(_begun(led.filter, glimpse.sun_b, covariance), 0.0, 0.0, strikes)
+
+
+@kernel
+def follow_gyro(
+    p: EkfParameters,
+    led: Led,
+    dt: float,
+    voltages,
+    speeds,
+    sky: Sky,
+    gyro_b: Vec3,
+    gyro_valid: bool,
+    glimpse: Glimpse,
+    largest: float,
+) -> Led:
+    """After one cycle; a filter whose cells misfit is begun anew where the cells alone see the Sun.
+
+    Args:
+        gyro_b, gyro_valid: of the cycle of the voltages.
+        glimpse: of the same.
+        largest: misfit that contradicts.
+    """
+    if not gyro_valid:
+        return Led(led.filter, 0.0, -_SETTLING, led.strikes)
+    if led.since < 0.0:
+        since = led.since + dt if glimpse.known else -_SETTLING
+        return _begin(led, glimpse, led.strikes) if since >= 0.0 else Led(led.filter, 0.0, since, led.strikes)
+    aided = Aiding(gyro_b, True, _NO_RATE, False, speeds, False, sky)
+    state, heading = sunline_ekf.step(p, led.filter, None, dt, voltages, aided)
+    misfit, since = led.misfit, led.since + dt
+    if heading.nis_dof > 0:
+        misfit += min(dt / _MEMORY, 1.0) * (heading.nis / heading.nis_dof - misfit)
+    if misfit > largest and since > _LONG:
+        strikes = min(led.strikes + 1, _STRIKES)
+        return _begin(led, glimpse, strikes) if glimpse.known else Led(state, misfit, since, strikes)
+    fits = misfit < _FIT * largest and since > _LONG
+    return Led(state, misfit, since, 1 if fits else led.strikes)
 
 
 @kernel

@@ -19,13 +19,13 @@ from css_estimation.health.aiding_health import (
     check_aiding,
 )
 from css_estimation.health.cell_health import watch_cells
-from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState
-from css_estimation.health.gyroless_sight import look
+from css_estimation.health.cell_memory import PHASE_LOOKING, CellHealthMemory, CellHealthState
+from css_estimation.health.gyroless_sight import Gyroless, Led, contradicts, follow_gyro, look
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun import heading_dispatch
 from css_estimation.sun.sun_heading import RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import elapsed
-from css_estimation.sun.sunline_ekf import EkfParameters, EkfState
+from css_estimation.sun.sunline_ekf import EkfParameters
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS, *aiding_health.PARAMETERS)
 _cell_parameters = builder(CellHealthParameters)
@@ -35,6 +35,7 @@ class Watched(NamedTuple):
     """Parameters."""
 
     sight: EkfParameters
+    led: EkfParameters
     aiding: AidingHealthParameters
     cells: CellHealthParameters
     own: Any  # of the algorithm
@@ -43,7 +44,8 @@ class Watched(NamedTuple):
 class WatchedState(NamedTuple):
     """Carried from cycle to cycle."""
 
-    sight: EkfState
+    sight: Gyroless
+    led: Led
     aiding: AidingHealthState
     cells: CellHealthState
     omega_bn_b: Vec3  # [rad/s] of the last heading
@@ -64,7 +66,7 @@ def watched_parameters(algorithm: Any, values: Values) -> Any:
     own = algorithm.parameters(values)
     if not values[ENABLED]:
         return own
-    return Watched(gyroless_sight.gyroless_parameters(values), aiding_health.parameters(values), _cell_parameters(values), own)
+    return Watched(gyroless_sight.gyroless_parameters(values), gyroless_sight.gyro_led_parameters(values), aiding_health.parameters(values), _cell_parameters(values), own)
 
 
 def initial_state(algorithm: Any, p: Any) -> Any:
@@ -73,6 +75,7 @@ def initial_state(algorithm: Any, p: Any) -> Any:
         return algorithm.initial_state(p)
     return WatchedState(
         gyroless_sight.initial_state(p.sight),
+        gyroless_sight.initial_led(p.led),
         aiding_health.initial_state(p.aiding),
         cell_health.initial_state(),
         (0.0, 0.0, 0.0),
@@ -97,9 +100,28 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
     dt_known = elapsed(dt)
     # by the outputs of the last cycle: those of this one are judged with the gyro
     sight_state, sight = look(
-        p.sight, state.sight, dt_known, memory.cells.trusted, memory.aiding.no_speeds, aiding.sky
+        p.sight,
+        state.sight,
+        dt_known,
+        memory.cells.trusted,
+        memory.aiding.no_speeds,
+        aiding.sky,
+        state.cells.phase != PHASE_LOOKING,
+        state.cells.sun_b,
     )
-    aiding_state, trusted = check_aiding(p.aiding, state.aiding, memory.aiding, dt_known, aiding, sight)
+    led = follow_gyro(
+        p.led,
+        state.led,
+        dt_known,
+        memory.cells.trusted,
+        memory.aiding.no_speeds,
+        aiding.sky,
+        state.aiding.gyro.readings.rate_b,
+        state.aiding.gyro.readings.spoken and state.aiding.gyro.readings.silent == 0.0,
+        sight,
+        p.aiding.gyro.largest_misfit,
+    )
+    aiding_state, trusted = check_aiding(p.aiding, state.aiding, memory.aiding, dt_known, aiding, sight, contradicts(led))
     aiding = Aiding(
         trusted.gyro_b,
         trusted.gyro_valid,
@@ -137,4 +159,4 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         cells.isolated,
         trusted.left,
     )
-    return WatchedState(sight_state, aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
+    return WatchedState(sight_state, led, aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading

@@ -13,6 +13,10 @@ from css_estimation.sun.sky_table import sky_at
 from css_estimation.sun.sun_heading import Aiding, Measured
 
 
+# What stands between the sensors and every algorithm; it calls the dispatch, so that this module cannot import it.
+_HEALTH = "css_estimation.health.watched"
+
+
 class Headings(NamedTuple):
     """`SunHeading` of M cycles."""
 
@@ -41,13 +45,13 @@ def new_headings(count: int) -> Headings:
 @cache
 def loop_of(algorithm: str) -> "Kernel":
     """The loop for the `SunAlgorithm` of a module; arguments in `_advance`."""
-    return kernel_of(_advance, algorithm)
+    return kernel_of(_advance, algorithm, _HEALTH)
 
 
 @cache
 def cycle_of(algorithm: str) -> "Kernel":
     """One cycle of the `SunAlgorithm` of a module; arguments as of `estimate_heading`."""
-    return kernel_of(_cycle, algorithm)
+    return kernel_of(_cycle, algorithm, _HEALTH)
 
 
 def _cycle(p: Any, state: Any, memory: Any, dt: float, voltages: Any, aiding: Aiding) -> Any:
