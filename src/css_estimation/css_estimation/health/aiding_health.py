@@ -9,7 +9,8 @@ from css_common.declared import builder, part, table_of
 from css_common.health import SORT_GYRO, SORT_MAGNETOMETER, new_verdicts
 from css_common.kernel import kernel
 from css_common.vectors import Vec3
-from css_estimation.health import gyro_state
+from css_estimation.health import field_health, gyro_state
+from css_estimation.health.field_health import FieldHealthParameters, FieldState, check_field
 from css_estimation.health.gyro_fit import new_fits
 from css_estimation.health.gyro_health import check_gyro
 from css_estimation.health.gyro_state import GyroHealthParameters, GyroState
@@ -22,6 +23,7 @@ class AidingHealthParameters(NamedTuple):
     """Of gyro and magnetometer."""
 
     gyro: GyroHealthParameters = part(GyroHealthParameters)
+    field: FieldHealthParameters = part(FieldHealthParameters)
 
 
 PARAMETERS = table_of(AidingHealthParameters)
@@ -43,6 +45,7 @@ class AidingHealthState(NamedTuple):
 
     step: int  # cycles so far
     gyro: GyroState
+    field: FieldState
 
 
 class AidingHealthMemory(NamedTuple):
@@ -51,18 +54,26 @@ class AidingHealthMemory(NamedTuple):
     axes: np.ndarray  # (3,) of GYRO_AXIS
     fits: np.ndarray  # of `gyro_fit`
     gyro_verdicts: np.ndarray  # (3,) of VERDICT
+    field_axes: np.ndarray  # (3,) of GYRO_AXIS
     field_verdicts: np.ndarray  # (3,) of VERDICT
     no_speeds: np.ndarray  # (0,) of wheels that nobody reckons with
 
 
 def initial_state(p: AidingHealthParameters) -> AidingHealthState:
     """Everything is trusted."""
-    return AidingHealthState(0, gyro_state.initial_state(p.gyro))
+    return AidingHealthState(0, gyro_state.initial_state(p.gyro), field_health.initial_state(p.field))
 
 
 def initial_memory(p: AidingHealthParameters) -> AidingHealthMemory:
     """Nothing held for failed."""
-    return AidingHealthMemory(new_axes(), new_fits(), new_verdicts(SORT_GYRO, 3), new_verdicts(SORT_MAGNETOMETER, 3), np.zeros(0))
+    return AidingHealthMemory(
+        new_axes(),
+        new_fits(),
+        new_verdicts(SORT_GYRO, 3),
+        new_axes(),
+        new_verdicts(SORT_MAGNETOMETER, 3),
+        np.zeros(0),
+    )
 
 
 @kernel
@@ -96,6 +107,17 @@ def check_aiding(
         sight,
         misfits,
     )
-    left = LEFT_GYRO if gyro_left else 0
-    trusted = Trusted(gyro_b, gyro_valid, aiding.field_b, aiding.field_valid, left)
-    return AidingHealthState(state.step + 1, gyro), trusted
+    field, field_b, field_valid, field_left = check_field(
+        p.field,
+        state.field,
+        memory.field_axes,
+        memory.field_verdicts,
+        dt,
+        state.step,
+        aiding.field_b,
+        aiding.field_valid,
+        aiding.sky,
+        sight,
+    )
+    left = (LEFT_GYRO if gyro_left else 0) + (LEFT_FIELD if field_left else 0)
+    return AidingHealthState(state.step + 1, gyro, field), Trusted(gyro_b, gyro_valid, field_b, field_valid, left)

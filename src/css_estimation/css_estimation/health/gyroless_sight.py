@@ -29,7 +29,7 @@ _GYRO_LED = {"process_sigma": 0.0015, "cell_sigma": 0.05}
 _MEMORY = 5.0  # [s] of which misfits are averaged
 _SETTLING = 5.0  # [s] in which a Sun that was found may still move
 _LONG = 10.0  # [s] after which a filter has shown that it fits, or not
-_FIT = 0.5
+_FIT, _GROSS = 0.5, 6.0
 _STRIKES = 2
 _FOUND = 0.1  # [rad^2] of a Sun that is found: 18 deg
 _PATIENCE = 30.0  # [s] of light
@@ -189,8 +189,10 @@ def follow_gyro(
     misfit, since = led.misfit, led.since + dt
     if heading.nis_dof > 0:
         misfit += min(dt / _MEMORY, 1.0) * (heading.nis / heading.nis_dof - misfit)
-    if misfit > largest and since > _LONG:
-        strikes = min(led.strikes + 1, _STRIKES)
+    # what no bad beginning explains counts at once
+    gross = misfit > _GROSS * largest and since > _MEMORY
+    if gross or (misfit > largest and since > _LONG):
+        strikes = _STRIKES if gross else min(led.strikes + 1, _STRIKES)
         return _begin(led, glimpse, strikes) if glimpse.known else Led(state, misfit, since, strikes)
     fits = misfit < _FIT * largest and since > _LONG
     return Led(state, misfit, since, 1 if fits else led.strikes)
@@ -200,5 +202,17 @@ def follow_gyro(
 def least_across(p: Symmetric) -> float:
     """The smaller of the two variances across a direction, of a covariance that has next to none along it."""
     half = 0.5 * trace(p)
+    return half - _half_difference(p, half)
+
+
+@kernel
+def most_across(p: Symmetric) -> float:
+    """The larger of the two."""
+    half = 0.5 * trace(p)
+    return half + _half_difference(p, half)
+
+
+@kernel
+def _half_difference(p: Symmetric, half: float) -> float:
     product = p[0] * p[3] - p[1] * p[1] + p[0] * p[5] - p[2] * p[2] + p[3] * p[5] - p[4] * p[4]
-    return half - math.sqrt(max(half * half - product, 0.0))
+    return math.sqrt(max(half * half - product, 0.0))

@@ -28,7 +28,7 @@ _SHARE = 1.0 / 20.0  # of a new sample in averages
 _SIGMAS = 6.0
 _RESTLESS = 2.0  # mean squared change over that of noise
 # Squared differences of neighbours have their noise in common: an average of 39 of them is worth so many that do not.
-_DEGREES_OF_FREEDOM = (2.0 / _SHARE - 1.0) / 1.5
+DEGREES_OF_FREEDOM = (2.0 / _SHARE - 1.0) / 1.5
 MOST_REFUSED = 0.3
 """Share of the samples, averaged, that may be spikes."""
 
@@ -89,7 +89,7 @@ class RateChecks(NamedTuple):
         NOISE,
         RESOLUTION,
     )
-    largest_change: float = computed(lambda values: gamma_quantile(_DEGREES_OF_FREEDOM, _SIGMAS))
+    largest_change: float = computed(lambda values: gamma_quantile(DEGREES_OF_FREEDOM, _SIGMAS))
     equal: int = made(equal_count, NOISE, RESOLUTION)
     acceleration: float = made(  # [rad/s2]
         math.radians,
