@@ -26,7 +26,7 @@ from css_common.health import (
 )
 from css_common.kernel import kernel
 from css_common.schema import Values, real
-from css_common.vectors import Vec3, angle_between, norm
+from css_common.vectors import Vec3, angle_between, dot, norm
 from css_estimation.health.gyro_samples import READING_ABSENT, READING_FAILED, READING_JUMPED, check_samples
 from css_estimation.health.gyroless_sight import Glimpse, most_across
 from css_estimation.health.rate_checks import DEGREES_OF_FREEDOM, RateChecks, equal_count, forget_samples, gamma_quantile
@@ -40,6 +40,8 @@ _EARTH = 3.986004418e14  # [m3/s2]
 _FASTEST = math.sqrt(_EARTH / 6.678e6**3)  # [rad/s] of an orbit at 300 km
 _STRENGTH_RATE = 1.5  # of the strength: along a polar orbit it doubles within a quarter, times the mean motion
 _ANGLE_RATE = 2.0  # the field of a dipole turns by twice the angle of the orbit
+# Where a few cells alone see the Sun, the sight may be off by more than it knows.
+_SIGHT = math.radians(15.0) ** 2  # [rad^2]
 _LEVER = math.radians(10.0)  # the angle of two directions tells little where they are nearly one
 
 NOISE = real("health.field.noise_nt", 100.0, "nT", "white noise of a sample per axis, 1 sigma", low=1e-6, high=1e6)
@@ -96,7 +98,7 @@ class FieldState(NamedTuple):
     good_b: Vec3  # [T] last good reading
     since: float  # [s] since the last reading; -1: there has been none
     strength: SlowValue  # [T]
-    angle: SlowValue  # [rad] to the Sun line
+    angle: SlowValue  # [-] cosine of that to the Sun line
     off: float  # [s] for which the model has been contradicted
     agreed: float  # [s] for which nothing has, of one that is left
     trial_time: float  # [s] how long that has to be
@@ -129,7 +131,7 @@ def _against_model(p: FieldHealthParameters, field_b: Vec3, sky: Sky, sight: Gli
     if min(model, math.pi - model) < _LEVER:
         return by_strength, 0.0
     turned = angle_between(field_b, sight.sun_b) - model
-    variance = p.variance / (strength * strength) + most_across(sight.covariance)
+    variance = p.variance / (strength * strength) + most_across(sight.covariance) + _SIGHT
     return by_strength, turned * turned / variance
 
 
@@ -189,11 +191,11 @@ def check_field(
         off = off + interval if contradicted else 0.0
         strength = follow(strength, size, p.variance, interval, _STRENGTH_RATE * _FASTEST * size, _FASTEST)
         if sight.known and size > 0.0:
-            variance = p.variance / (size * size) + most_across(sight.covariance)
-            # the angle is one of 0 to 180 deg: near its ends it cannot change as it does between
-            angle = follow(
-                angle, angle_between(good_b, sight.sun_b), variance, interval, _ANGLE_RATE * _FASTEST, _FASTEST
-            )
+            # of the angle itself the change would have a kink where the two directions meet
+            cosine = dot(good_b, sight.sun_b) / size
+            spread = p.variance / (size * size) + most_across(sight.covariance) + _SIGHT
+            variance = max(1.0 - cosine * cosine, 0.0) * spread + 0.5 * spread * spread
+            angle = follow(angle, cosine, variance, interval, _ANGLE_RATE * _FASTEST, _FASTEST)
         if off > p.persistence:
             failed = True
             by_sun = by_angle > by_strength and not weak

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
-from css_common.matrices import scaled, skew, sum_of
+from css_common.matrices import IDENTITY, scaled, skew, sum_of
 from css_common.vectors import Mat3, Vec3, add, matmul, multiply, norm, scale, subtract
 
 NO_MATRIX: Mat3 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -60,8 +60,8 @@ def carry(line: Line, gyro_b: Vec3, dt: float) -> Line:
     rate_b = subtract(gyro_b, line.bias_b)
     turn = rotation_vector_to_dcm(scale(dt, rate_b))
     after_b = multiply(turn, line.vector_b)
-    # the vector in the middle of the step, so that long steps at high rates are right too
-    push = scaled(-dt, skew(scale(0.5, add(line.vector_b, after_b))))
+    # the mean of begin and end of the step, so that long steps at high rates are right too
+    push = scaled(-0.5 * dt, matmul(skew(after_b), sum_of(turn, IDENTITY)))
     return Line(
         True,
         after_b,
