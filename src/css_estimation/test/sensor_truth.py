@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A body that tumbles without torque, what its sensors read, and the health of them driven through it."""
 
+from functools import cache
+
 import numpy as np
 from okeefe_spacecraft import okeefe_values
 
@@ -24,6 +26,7 @@ def parameters(**changes):
     return aiding_health.parameters(okeefe_values(aiding_health.PARAMETERS, **changes))
 
 
+@cache
 def tumble(rate_deg_s, count, dt):
     """Body rates (count, 3) [rad/s] and directions cosine matrices (count, 3, 3) of dcm_bn, by Euler's equations."""
     omega, dcm = np.array(rate_deg_s) * DEG, np.eye(3)

@@ -48,7 +48,7 @@ def spoilt(gyro, axis, fault, from_s=60.0):
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_good_gyro_is_given_on_untouched(rate, seed):
-    _, gyro, sun, _ = flight(rate, seed, 4 * COUNT)
+    _, gyro, sun, _ = flight(rate, seed, 2 * COUNT)
     result = judged(gyro, sun)
     assert np.array_equal(result.rate_b, gyro)
     assert result.gyro_valid.all()
@@ -58,7 +58,7 @@ def test_a_good_gyro_is_given_on_untouched(rate, seed):
 
 @pytest.mark.parametrize("rate", [(0.0, 0.0, 0.6), (0.0, 0.0, 0.0)])
 def test_nor_is_that_of_a_body_that_hardly_turns(rate):
-    _, gyro, sun, _ = flight(rate, count=4 * COUNT)
+    _, gyro, sun, _ = flight(rate, count=2 * COUNT)
     result = judged(gyro, sun)
     assert np.array_equal(result.rate_b, gyro)
     assert not result.left.any()
@@ -209,7 +209,8 @@ def test_along_a_sun_line_at_rest_in_the_body_nothing_is_known():
     gyro[:, 0] += DEG
     result = judged(gyro, sun)
     assert result.mode[-1] == GYRO_CORRECTED
-    assert unseen_sigma(result.state.gyro, (0.0, 0.0, 1.0)) > 5.0 * DEG
-    assert unseen_sigma(result.state.gyro, (1.0, 0.0, 0.0)) < 0.2 * DEG
-    # and so nothing is said of the rate there
-    assert abs(result.rate_b[-1, 2]) < 0.1 * DEG
+    known = unseen_sigma(result.state.gyro, (1.0, 0.0, 0.0))
+    assert known < 0.2 * DEG
+    assert unseen_sigma(result.state.gyro, (0.0, 0.0, 1.0)) > 10.0 * known
+    # and so less is said of the rate there than the gyro reads
+    assert abs(result.rate_b[-1, 2]) < abs(gyro[-1, 2])

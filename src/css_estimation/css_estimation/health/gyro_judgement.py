@@ -51,6 +51,18 @@ def _accuse_biased(p: GyroHealthParameters, verdicts, bias: Bias, kind: int, evi
 
 
 @kernel
+def _review_biased(p: GyroHealthParameters, verdicts, bias: Bias, evidence: int, step: int) -> None:
+    """Which axes are biased is known better by and by."""
+    worst = _worst_axis(p, bias)
+    for i in range(3):
+        statistic = axis_significance(bias, i, p.usual_bias)
+        if verdicts[i].held == 0 and (i == worst or statistic > p.threshold):
+            hold(verdicts[i], KIND_BIAS, evidence, statistic, p.threshold, step)
+        elif verdicts[i].held != 0 and i != worst and statistic < p.agreement:
+            release(verdicts[i])
+
+
+@kernel
 def _worst_axis(p: GyroHealthParameters, bias: Bias) -> int:
     """The axis whose bias is farthest beyond the usual."""
     worst, largest = 0, -1.0
@@ -122,7 +134,10 @@ def judge(
         shape if shaped and not shape.drifts else opinion.claim,
         opinion.trial_time,
     )
-    if shaped and (contradicted or opinion.mode != GYRO_TRUSTED):
+    if shaped and (misfits or opinion.mode != GYRO_TRUSTED):
+        if goes_with_rate and opinion.mode != GYRO_LEFT:
+            # a bias that seemed to be one was not
+            release_all(verdicts)
         _accuse(verdicts[shape.axis], kind_of(shape), evidence, shape.statistic, p.threshold, step)
     if opinion.mode == GYRO_LEFT:
         return _try_again(p, now, fits, verdicts, shaped, evidence, step)
@@ -173,6 +188,7 @@ def _go_on(
         mode = GYRO_CORRECTED if wrong else GYRO_TRUSTED
         return Opinion(mode, now.bias, now.drift, now.fit_time, 0.0, False, NO_SHAPE, now.trial_time)
     if beyond > p.agreement:
+        _review_biased(p, verdicts, now.bias, evidence, step)
         return Opinion(GYRO_CORRECTED, now.bias, now.drift, now.fit_time, 0.0, False, NO_SHAPE, now.trial_time)
     if now.trial < max(p.return_time, now.trial_time):
         return now
