@@ -92,7 +92,7 @@ def test_a_step_is_taken_off_at_once_also_where_the_sun_does_not_tell(axis, size
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("axis", range(3))
 def test_a_wrong_sign_is_left_and_not_used_again(rate, axis):
-    omega, gyro, sun, _ = flight(rate)
+    _, gyro, sun, _ = flight(rate)
     result = judged(spoilt(gyro, axis, lambda x, t: -x, 0.0), sun)
     assert result.mode[-1] == GYRO_LEFT
     assert result.gyro_kinds == {axis: KIND_SIGN}

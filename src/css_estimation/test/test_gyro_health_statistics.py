@@ -8,11 +8,12 @@ import pytest
 from scipy import stats
 from sensor_truth import DEG, SUN_N, tumble
 
-from css_common.vectors import vector_of
+from css_common.vectors import mat3, vector_of
 from css_estimation.health.gyro_bias import corrected, learn, significance, unknown_bias
 from css_estimation.health.gyro_fit import add_block, best_shape, new_fits
 from css_estimation.health.rate_checks import equal_count, gamma_quantile
 from css_estimation.health.reference_line import begin_line, carry, off_the_gyro
+from css_estimation.symmetric import inverse, inverse_form
 
 LARGEST = (10.0 * DEG) ** 2
 DT = 0.1
@@ -36,7 +37,7 @@ def test_what_a_bias_does_to_a_carried_line(rate, axis):
     right, _ = block(rate, np.zeros(3))
     line, _ = block(rate, error)
     behind = np.array(right.vector_b) - np.array(line.vector_b)
-    np.testing.assert_allclose(behind, np.array(line.by_bias) @ error, atol=2e-3 * np.linalg.norm(behind) + 1e-9)
+    np.testing.assert_allclose(behind, np.array(line.by_bias) @ error, atol=float(2e-3 * np.linalg.norm(behind)) + 1e-9)
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -47,7 +48,7 @@ def test_what_a_scale_does_to_a_carried_line(axis):
     behind = np.array(right.vector_b) - np.array(line.vector_b)
     # e = c g with g = (1 + scale) w
     c = scale / (1.0 + scale)
-    np.testing.assert_allclose(behind, np.array(line.by_scale) @ c, atol=5e-3 * np.linalg.norm(behind))
+    np.testing.assert_allclose(behind, np.array(line.by_scale) @ c, atol=float(5e-3 * np.linalg.norm(behind)))
 
 
 def test_a_known_bias_keeps_a_large_one_linear():
@@ -65,11 +66,8 @@ def test_the_bias_is_within_its_covariance():
         bias = unknown_bias(LARGEST)
         for m in dice.normal(size=(30, 3, 3)):
             d = m @ truth + 0.05 * dice.normal(size=3)
-            bias = learn(bias, tuple(map(tuple, m)), tuple(d), 0.05**2, 3)
-        p = bias.covariance
-        p = np.array([[p[0], p[1], p[2]], [p[1], p[3], p[4]], [p[2], p[4], p[5]]])
-        off = np.array(bias.bias_b) - truth
-        nees.append(off @ np.linalg.solve(p, off))
+            bias = learn(bias, mat3(m), tuple(d), 0.05**2, 3)
+        nees.append(inverse_form(bias.covariance, vector_of(np.array(bias.bias_b) - truth)))
     low, high = stats.chi2.ppf([0.001, 0.999], 3 * len(nees)) / len(nees)
     assert low < np.mean(nees) < high
 
@@ -81,7 +79,7 @@ def test_a_bias_is_significant_as_rarely_as_chi_square_says():
         truth = math.sqrt(usual) * dice.normal(size=3)
         bias = unknown_bias(LARGEST)
         for m in dice.normal(size=(10, 3, 3)):
-            bias = learn(bias, tuple(map(tuple, m)), tuple(m @ truth + 1e-3 * dice.normal(size=3)), 1e-6, 3)
+            bias = learn(bias, mat3(m), tuple(m @ truth + 1e-3 * dice.normal(size=3)), 1e-6, 3)
         beyond.append(significance(bias, usual))
     for level in (0.5, 0.9, 0.99):
         share = np.mean(np.array(beyond) > stats.chi2.ppf(level, 3))
@@ -95,7 +93,7 @@ def statistics_of(dice, error):
         f = dice.normal(size=(3, 3))
         g = f * dice.normal(size=3)
         d = f @ np.array([3.0, -2.0, 1.0]) + error(f, g, k) + dice.normal(size=3)
-        add_block(fits, tuple(map(tuple, f)), tuple(map(tuple, g)), tuple(d), 1.0, float(k), 1.0)
+        add_block(fits, mat3(f), mat3(g), tuple(d), 1.0, float(k), 1.0)
     return best_shape(fits, False, 1e9, 0.0), best_shape(fits, True, 1e9, 0.0)
 
 
@@ -145,3 +143,11 @@ def test_how_often_samples_are_equal(resolution):
     count = equal_count(1.0, resolution)
     assert equal**count < 1e-8
     assert equal_count(1.0, 0.0) == 5
+
+
+def test_the_inverse_of_a_symmetric_matrix():
+    root = np.random.default_rng(8).normal(size=(3, 3))
+    m = root @ root.T
+    i = inverse((m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]))
+    full = np.array([[i[0], i[1], i[2]], [i[1], i[3], i[4]], [i[2], i[4], i[5]]])
+    np.testing.assert_allclose(full @ m, np.eye(3), atol=1e-9)

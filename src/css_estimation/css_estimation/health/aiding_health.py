@@ -14,8 +14,8 @@ from css_estimation.health.field_health import FieldHealthParameters, FieldState
 from css_estimation.health.gyro_fit import new_fits
 from css_estimation.health.gyro_health import check_gyro
 from css_estimation.health.gyro_state import GyroHealthParameters, GyroState
-from css_estimation.health.rate_checks import new_axes
 from css_estimation.health.gyroless_sight import Glimpse
+from css_estimation.health.rate_checks import new_axes
 from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO, Aiding
 
 

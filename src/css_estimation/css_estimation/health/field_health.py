@@ -29,7 +29,13 @@ from css_common.schema import Values, real
 from css_common.vectors import Vec3, angle_between, dot, norm
 from css_estimation.health.gyro_samples import READING_ABSENT, READING_FAILED, READING_JUMPED, check_samples
 from css_estimation.health.gyroless_sight import Glimpse, most_across
-from css_estimation.health.rate_checks import DEGREES_OF_FREEDOM, RateChecks, equal_count, forget_samples, gamma_quantile
+from css_estimation.health.rate_checks import (
+    DEGREES_OF_FREEDOM,
+    RateChecks,
+    equal_count,
+    forget_samples,
+    gamma_quantile,
+)
 from css_estimation.health.slow_value import NOTHING_YET, SlowValue, follow
 from css_estimation.sun.sun_heading import Sky
 
@@ -46,7 +52,9 @@ _LEVER = math.radians(10.0)  # the angle of two directions tells little where th
 
 NOISE = real("health.field.noise_nt", 100.0, "nT", "white noise of a sample per axis, 1 sigma", low=1e-6, high=1e6)
 RESOLUTION = real("health.field.resolution_nt", 30.0, "nT", "step of its output, at most", low=0.0, high=1e6)
-ERROR = real("health.field.error_nt", 1000.0, "nT", "lasting error of magnetometer and model, 1 sigma", low=1.0, high=1e6)
+ERROR = real(
+    "health.field.error_nt", 1000.0, "nT", "lasting error of magnetometer and model, 1 sigma", low=1.0, high=1e6
+)
 LARGEST = real("health.field.largest_nt", 8e4, "nT", "no field in orbit is stronger", low=1.0, high=1e9)
 LEAST = real("health.field.least_nt", 3e3, "nT", "nor weaker", low=0.0, high=1e9)
 TURN = real("health.field.turn_deg_s", 20.0, "deg/s", "no faster does the body turn", low=0.1, high=1e4)
@@ -78,7 +86,14 @@ class FieldHealthParameters(NamedTuple):
     )
     largest_nis: float = computed(lambda values: gamma_quantile(_NIS_DEGREES, _SIGMAS))
     persistence: float = given(
-        real("health.field.persistence", 3.0, "s", "contradiction of the model for longer is a failure", low=0.0, high=1e4)
+        real(
+            "health.field.persistence",
+            3.0,
+            "s",
+            "contradiction of the model for longer is a failure",
+            low=0.0,
+            high=1e4,
+        )
     )
     return_time: float = given(
         real("health.field.return_time", 60.0, "s", "agreement after which it is used again", low=1.0, high=1e5)

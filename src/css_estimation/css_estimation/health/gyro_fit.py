@@ -107,7 +107,7 @@ def _bias_covariance(fits, largest_bias: float) -> Symmetric:
 
 @kernel
 def _value(fits, s: int, covariance: Symmetric) -> tuple[float, float]:
-    """Least-squares value of a shape beside the biases, and its variance; infinite where it cannot be told from them."""
+    """Least-squares value of a shape beside the biases, and its variance; infinite where they cannot be told apart."""
     b, e = fits[BIASES], fits[s]
     common = (e.x, e.y, e.z)
     taken = product(covariance, common)

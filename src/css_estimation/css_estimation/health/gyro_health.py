@@ -9,20 +9,19 @@ from css_common.health import EVIDENCE_DEAD, EVIDENCE_NOISE, EVIDENCE_SUN, KIND_
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, add, matmul, multiply, scale
 from css_estimation.health.gyro_bias import corrected
-from css_estimation.health.gyro_judgement import heed_jumps, judge, release_all
+from css_estimation.health.gyro_judgement import heed_jumps, judge
 from css_estimation.health.gyro_samples import READING_ABSENT, READING_FAILED, READING_JUMPED, check_samples
 from css_estimation.health.gyro_state import (
     GYRO_CORRECTED,
     GYRO_LEFT,
     GyroHealthParameters,
     GyroState,
-    Opinion,
     Readings,
     leave,
 )
+from css_estimation.health.gyroless_sight import Glimpse
 from css_estimation.health.rate_checks import forget_samples
 from css_estimation.health.reference_line import off_the_gyro
-from css_estimation.health.gyroless_sight import Glimpse
 from css_estimation.health.sight_line import (
     begin_again,
     follow_sight,

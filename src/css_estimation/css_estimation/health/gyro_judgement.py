@@ -7,7 +7,17 @@ from css_common.health import KIND_BIAS, KIND_DRIFTING, KIND_SIGN, KIND_UNKNOWN,
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3
 from css_estimation.health.gyro_bias import Bias, after_jumps, axis_significance, jumped, learn, significance, walk
-from css_estimation.health.gyro_fit import NO_SHAPE, add_block, best_shape, forget_fits, is_motion, kind_of, refutes, sign_of_axis, wrong_sign
+from css_estimation.health.gyro_fit import (
+    NO_SHAPE,
+    add_block,
+    best_shape,
+    forget_fits,
+    is_motion,
+    kind_of,
+    refutes,
+    sign_of_axis,
+    wrong_sign,
+)
 from css_estimation.health.gyro_state import (
     GYRO_CORRECTED,
     GYRO_LEFT,

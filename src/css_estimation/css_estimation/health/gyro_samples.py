@@ -19,7 +19,6 @@ from css_common.kernel import kernel
 from css_common.vectors import Vec3, norm
 from css_estimation.health.rate_checks import (
     MOST_REFUSED,
-    SAMPLE_GOOD,
     SAMPLE_JUMPED,
     SAMPLE_NOISY,
     SAMPLE_RANGE,

@@ -59,9 +59,7 @@ class GyroHealthParameters(NamedTuple):
     )
     walk: float = made(  # [rad2/s3]
         _variance,
-        real(
-            "health.gyro.walk_deg_s", 1e-3, "deg/s", "change of its bias within a second, 1 sigma", low=0.0, high=1.0
-        ),
+        real("health.gyro.walk_deg_s", 1e-3, "deg/s", "change of its bias within a second, 1 sigma", low=0.0, high=1.0),
     )
     body_rate: float = made(
         _variance,

@@ -17,8 +17,8 @@ from css_common.declared import given, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import real
 from css_common.vectors import Mat3, Vec3, add, axes_across, cross, dot, scale, subtract
-from css_estimation.health.reference_line import NO_LINE, Line, begin_line, carry
 from css_estimation.health.gyroless_sight import Glimpse
+from css_estimation.health.reference_line import NO_LINE, Line, begin_line, carry
 from css_estimation.symmetric import Symmetric, product
 
 _SHARE = 1.0 / 20.0  # of a new cycle in the measured jitter
@@ -95,7 +95,13 @@ def across(direction: Vec3, v: Vec3) -> Vec3:
 
 @kernel
 def follow_sight(
-    p: SightLineParameters, state: SightLine, dt: float, rate_b: Vec3, bias_b: Vec3, largest_error: float, sight: Glimpse
+    p: SightLineParameters,
+    state: SightLine,
+    dt: float,
+    rate_b: Vec3,
+    bias_b: Vec3,
+    largest_error: float,
+    sight: Glimpse,
 ) -> tuple[SightLine, Vec3]:
     """One cycle: the block, and what the sight is off the line that the gyro has carried [rad].
 

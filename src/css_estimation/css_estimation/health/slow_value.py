@@ -18,10 +18,10 @@ class SlowValue(NamedTuple):
     c: float  # covariance
     q: float  # variance of the slope
     nis: float  # [-] normalised innovation squared, averaged
-    count: int  # measurements so far
+    begun: bool  # there has been a measurement
 
 
-NOTHING_YET = SlowValue(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0)
+NOTHING_YET = SlowValue(0.0, 0.0, 0.0, 0.0, 0.0, 1.0, False)
 
 
 @kernel
@@ -34,8 +34,8 @@ def follow(slow: SlowValue, x: float, variance: float, dt: float, rate: float, m
         rate: how fast the orbit changes the quantity, 1 sigma [1/s].
         mean_motion: of the orbit [rad/s]; the slope is another after the time in which it turns by 1/2 rad.
     """
-    if slow.count == 0:
-        return SlowValue(x, 0.0, variance, 0.0, rate * rate, 1.0, 1)
+    if not slow.begun:
+        return SlowValue(x, 0.0, variance, 0.0, rate * rate, 1.0, True)
     p = slow.p + 2.0 * dt * slow.c + dt * dt * slow.q
     c = slow.c + dt * slow.q
     q = min(slow.q + 4.0 * mean_motion * rate * rate * dt, rate * rate)
@@ -49,5 +49,5 @@ def follow(slow: SlowValue, x: float, variance: float, dt: float, rate: float, m
         c - p * c / s,
         q - c * c / s,
         slow.nis + (nis - slow.nis) / _MEMORY,
-        slow.count + 1,
+        True,
     )

@@ -20,8 +20,8 @@ from css_estimation.health.aiding_health import (
 )
 from css_estimation.health.cell_health import watch_cells
 from css_estimation.health.cell_memory import PHASE_LOOKING, CellHealthMemory, CellHealthState
-from css_estimation.health.gyroless_sight import Gyroless, Led, contradicts, follow_gyro, look
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
+from css_estimation.health.gyroless_sight import Gyroless, Led, contradicts, follow_gyro, look
 from css_estimation.sun import heading_dispatch
 from css_estimation.sun.sun_heading import RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import elapsed
@@ -66,7 +66,13 @@ def watched_parameters(algorithm: Any, values: Values) -> Any:
     own = algorithm.parameters(values)
     if not values[ENABLED]:
         return own
-    return Watched(gyroless_sight.gyroless_parameters(values), gyroless_sight.gyro_led_parameters(values), aiding_health.parameters(values), _cell_parameters(values), own)
+    return Watched(
+        gyroless_sight.gyroless_parameters(values),
+        gyroless_sight.gyro_led_parameters(values),
+        aiding_health.parameters(values),
+        _cell_parameters(values),
+        own,
+    )
 
 
 def initial_state(algorithm: Any, p: Any) -> Any:
@@ -121,7 +127,9 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         sight,
         p.aiding.gyro.largest_misfit,
     )
-    aiding_state, trusted = check_aiding(p.aiding, state.aiding, memory.aiding, dt_known, aiding, sight, contradicts(led))
+    aiding_state, trusted = check_aiding(
+        p.aiding, state.aiding, memory.aiding, dt_known, aiding, sight, contradicts(led)
+    )
     aiding = Aiding(
         trusted.gyro_b,
         trusted.gyro_valid,
@@ -159,4 +167,6 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         cells.isolated,
         trusted.left,
     )
-    return WatchedState(sight_state, led, aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
+    return WatchedState(
+        sight_state, led, aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own
+    ), heading

@@ -12,7 +12,6 @@ from css_estimation.sun.heading_dispatch import estimate_heading
 from css_estimation.sun.sky_table import sky_at
 from css_estimation.sun.sun_heading import Aiding, Measured
 
-
 # What stands between the sensors and every algorithm; it calls the dispatch, so that this module cannot import it.
 _HEALTH = "css_estimation.health.watched"
 
