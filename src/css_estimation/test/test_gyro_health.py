@@ -135,6 +135,12 @@ def test_samples_that_cannot_be_are_found_within_seconds(fault, kind, axis):
     assert result.gyro_kinds == {axis: kind}
 
 
+def test_a_gyro_without_noise_may_read_the_same_for_ever():
+    _, _, sun, _ = flight((0.0, 0.0, 0.0), count=600)
+    result = judged(np.zeros((600, 3)), sun)
+    assert not result.left.any()
+
+
 def test_spells_of_zeros_are_an_intermittent_axis():
     _, gyro, sun, _ = flight(RATES[0], count=2 * COUNT)
     for first in (1000, 4000):

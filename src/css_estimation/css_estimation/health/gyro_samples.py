@@ -26,6 +26,7 @@ from css_estimation.health.rate_checks import (
     SAMPLE_STUCK,
     RateChecks,
     check_sample,
+    has_noise,
     restless,
 )
 
@@ -85,6 +86,8 @@ def check_samples(p: RateChecks, axes, verdicts, dt: float, step: int, gyro_b: V
             reading = max(reading, READING_JUMPED)
         elif status == SAMPLE_RANGE and (axes[i].seen == 0 or axes[i].gap <= p.patience):
             reading = max(reading, READING_ABSENT if axes[i].seen == 0 else READING_GOOD)
+        elif status == SAMPLE_STUCK and not has_noise(axes):
+            continue
         elif status in (SAMPLE_STUCK, SAMPLE_RANGE, SAMPLE_SPIKY, SAMPLE_NOISY):
             reading = READING_FAILED
             _accuse(p, axes[i], verdicts[i], status, step)

@@ -4,7 +4,8 @@
 range    not a number, or a rate beyond any of this spacecraft
 spike    farther from the last good sample than noise and torques can bring it: that one is left out. When the next
          ones agree with it, it was a jump: the body cannot have done it, so the error of the gyro has changed by it
-stuck    so often the very same number that noise and rounding would show it once in 1e9 runs
+stuck    so often the very same number that noise and rounding would show it once in 1e9 runs; judged once an axis of
+         the sensor has shown noise
 noise    squared differences of successive samples, averaged, beyond what noise and torques make of them
 
 A body without torque changes its rate by |J^-1 (w x J w)| < |w|^2 at most, whatever its moments of inertia, which add
@@ -51,6 +52,7 @@ GYRO_AXIS = np.dtype(
         ("zeros", np.int64),  # spells of exact zeros so far
         ("came_by_jump", np.int64),  # what it reads now was jumped to
         ("jumped", np.int64),  # in this cycle
+        ("changes", np.int64),  # samples that were not as the one before
     ],
     align=True,
 )
@@ -120,6 +122,12 @@ def new_axes() -> np.ndarray:
 
 
 @kernel
+def has_noise(axes) -> bool:
+    """Whether some axis (3,) has shown noise: one of a sensor without any may read the same for ever."""
+    return axes[0].changes >= _FEWEST_EQUAL or axes[1].changes >= _FEWEST_EQUAL or axes[2].changes >= _FEWEST_EQUAL
+
+
+@kernel
 def forget_samples(axis) -> None:
     """After a silence: the next sample is the first."""
     axis.seen = axis.equal = axis.agreeing = 0
@@ -156,6 +164,7 @@ def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
         axis.equal += 1
     else:
         axis.equal = 0
+        axis.changes += 1
         axis.came_by_jump = 1 if abs(change) > step else 0
         axis.zeros += 1 if x == 0.0 else 0
     axis.raw = x
