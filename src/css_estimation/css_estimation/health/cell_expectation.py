@@ -17,6 +17,9 @@ from css_estimation.symmetric import Symmetric, product
 _MOST = 25.0
 """Bound on the squared sigmas of a single cell, so that no single look decides."""
 
+# Variance of the Earth's light where it is a guess, by the square of its bound: that is 2.5 sigma.
+_EARTH_SHARE = 0.16
+
 HIDDEN, DOUBTFUL, SEEN = 0, 1, 2
 
 
@@ -67,6 +70,19 @@ def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric
     high = light * max(0.0, cosine)
     low = high if view == SEEN else 0.0
     return Expected(low, high, p.floor + p.share * high * high + light * light * spread, view)
+
+
+@kernel
+def misfit(p: CellHealthParameters, e: Expected, output: float) -> float:
+    """Squared sigmas by which an output is off, bounded, where much light of the Earth is possible but unlikely."""
+    off = 0.0
+    variance = e.variance
+    if output > e.high:
+        off = output - e.high
+        variance += p.earth * p.earth * _EARTH_SHARE
+    elif output < e.low:
+        off = output - e.low
+    return min(off * off / variance, _MOST)
 
 
 @kernel

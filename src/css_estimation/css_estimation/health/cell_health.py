@@ -29,7 +29,7 @@ from css_estimation.health.cell_memory import (
     CellHealthState,
 )
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.health.cell_search import best_direction, cost, gather, refine
+from css_estimation.health.cell_search import best_rival, cost, gather, refine
 from css_estimation.health.cell_signals import (
     LEAPING,
     NO_SIGNAL,
@@ -60,8 +60,8 @@ EVIDENCE_DARK = 8
 _LOOK = 0.499  # [s]
 _LONGEST = 10.0  # [s] beyond it nothing is known of how the body turned
 _FIRST_LOOKS = 1.0  # [s] of light before a direction is followed
-_LONGEST_SEARCH = 20.0  # [s] after which the best there is has to do
-_SPOT = 0.12  # [rad^2] of a direction that is found: 20 deg
+_LONGEST_SEARCH = 5.0  # [s] after which the best there is has to do
+_SPOT = 0.3  # [rad^2] of a direction that is found: 30 deg
 _SETTLED_AFTER = 3.0  # [s]
 _SETTLED = 0.03  # [rad^2] trace: 7 deg per axis
 _USELESS = 0.5  # [rad^2] of a direction that has to be looked for anew
@@ -73,7 +73,8 @@ _NOISE, _NOISE_WITHOUT_RATE = 0.02**2, 0.1**2  # [rad^2/s]
 _EARTH_ERROR = 0.1  # of an output, 1 sigma
 _LARGEST_VARIANCE = 1.0  # [rad^2]
 _BETTER = 10.0  # squared sigmas by which another direction has to explain all cells better
-_WORTH = 60.0  # squared sigmas that a direction which was followed with a gyro is worth
+_WORTH = 60.0  # squared sigmas that a direction is worth which has been followed with a measured rate
+_CALM = 30.0  # [s] for so long without a contradiction
 _FADED = 0.75  # share of the light below which it sets
 _DEAD = 0.05
 _AGREES = 6.0  # squared sigmas
@@ -93,7 +94,7 @@ def initial_state() -> CellHealthState:
     """Nothing seen yet."""
     zero = (0.0, 0.0, 0.0)
     return CellHealthState(
-        PHASE_LOOKING, 0.0, 0.0, (0.0, 0.0, 1.0), isotropic.py_func(1.0), 1.0, IDENTITY, zero, 0.0, 0.0, 0, 0, math.inf
+        PHASE_LOOKING, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), isotropic.py_func(1.0), 1.0, IDENTITY, zero, 0.0, 0.0, 0, 0, math.inf
     )
 
 
@@ -123,6 +124,7 @@ def watch_cells(
         state.phase,
         state.since,
         state.lost,
+        state.calm,
         state.sun_b,
         state.covariance,
         state.light,
@@ -158,11 +160,12 @@ def _look(
         if means[i] > top and _in_use(memory, i):
             top = means[i]
         memory.used[i] = means[i] if _in_use(memory, i) else math.nan
+        memory.judged[i] = means[i] if _in_use(memory, i) or _by_others(cell) else math.nan
     window = state.window
     noise = _NOISE if rate_known else _NOISE_WITHOUT_RATE
     sun_b, covariance = propagate(state.sun_b, state.covariance, scale(1.0 / max(window, 1e-9), state.turn_b), window, noise)
     frame = matmul(rotation_vector_to_dcm(state.turn_b), state.frame)
-    phase, since, lost, light = state.phase, state.since, state.lost, state.light
+    phase, since, lost, calm, light = state.phase, state.since, state.lost, state.calm, state.light
     if window > _LONGEST:
         phase, since, lost = PHASE_LOOKING, 0.0, 0.0
     lit = top > p.minimum
@@ -175,8 +178,8 @@ def _look(
         if phase == PHASE_LOOKING:
             phase, since, sun_b, covariance, frame = _find(p, memory, means, since, sun_b, covariance, frame, light, rate_known)
         else:
-            phase, since, lost, sun_b, covariance, light = _follow(
-                p, memory, means, phase, since, lost, sun_b, covariance, light, window, rate_known, state.step
+            phase, since, lost, calm, sun_b, covariance, light = _follow(
+                p, memory, means, phase, since, lost, calm, sun_b, covariance, light, window, rate_known, state.step
             )
     _judge_signals(p, memory, means, state.step, phase, sun_b, covariance, light, lit)
     if night and (dark if not lit else window) > 0.0:
@@ -189,6 +192,7 @@ def _look(
         phase,
         since,
         lost,
+        calm,
         sun_b,
         covariance,
         light,
@@ -206,6 +210,12 @@ def _look(
 def _in_use(memory: CellHealthMemory, i: int) -> bool:
     """Whether the direction rests on a cell."""
     return memory.cells[i].isolated == 0 and memory.cells[i].out_of_range == 0.0
+
+
+@kernel
+def _by_others(cell) -> bool:
+    """Whether a cell has been left out for what others read, not for what it shows by itself."""
+    return cell.isolated == 1 and (cell.evidence == EVIDENCE_DEAD or cell.evidence == EVIDENCE_RESIDUAL)
 
 
 @kernel
@@ -230,7 +240,7 @@ def _find(p, memory, means, since, sun_b, covariance, frame, light, rate_known):
 
 
 @kernel
-def _follow(p, memory, means, phase, since, lost, sun_b, covariance, light, window, rate_known, step):
+def _follow(p, memory, means, phase, since, lost, calm, sun_b, covariance, light, window, rate_known, step):
     """A look with a direction to follow."""
     # who sees the Sun, who contradicts, and what is left of the light where it should be
     support = against = lit_ones = 0
@@ -267,28 +277,32 @@ def _follow(p, memory, means, phase, since, lost, sun_b, covariance, light, wind
     lost = lost + window if wrong else max(0.0, lost - window)
     if phase == PHASE_FOLLOWING and since > _SETTLED_AFTER and trace(covariance) < _SETTLED and not wrong:
         phase, since = PHASE_SETTLED, 0.0
+    calm = calm + window if against == 0 and support >= 2 and rate_known else max(0.0, calm - window)
+    calm = min(calm, _CALM)
     if phase == PHASE_SETTLED:
-        beyond = _score(p, memory, means, prior_b, prior_covariance, light, window, step, fades, support)
-        if beyond > 0:
-            here = cost(p, memory.used, prior_b, prior_covariance, light)
-            worth = _WORTH if rate_known else 0.0
-            there, best = best_direction(
-                p, memory.used, light, prior_b, 0.5 * trace(prior_covariance) + p.heading, worth
-            )
+        beyond, doubted = _score(p, memory, means, prior_b, prior_covariance, light, window, step, fades, support)
+        if (beyond > 0 or doubted > 0):
+            here = cost(p, memory.judged, prior_b, prior_covariance, light)
+            variance = 0.5 * trace(prior_covariance) + p.heading
+            there, rival = best_rival(p, memory.judged, light, prior_b, variance, _WORTH * calm / _CALM)
             if there + _BETTER < here:
-                _clear_scores(memory)
-                return PHASE_FOLLOWING, 0.0, 0.0, best, isotropic(0.03), light
-            _isolate(p, memory, step, window)
+                _trust_again(memory)
+                return PHASE_FOLLOWING, 0.0, 0.0, 0.0, rival, isotropic(0.03), light
+            if beyond > 0 and here + _BETTER < there:
+                _isolate(p, memory, step, window)
     if lost > _LOST_AFTER:
-        _clear_scores(memory)
-        return PHASE_LOOKING, 0.0, 0.0, sun_b, covariance, light
-    return phase, since, lost, sun_b, covariance, light
+        _trust_again(memory)
+        return PHASE_LOOKING, 0.0, 0.0, 0.0, sun_b, covariance, light
+    return phase, since, lost, calm, sun_b, covariance, light
 
 
 @kernel
-def _score(p, memory, means, sun_b, covariance, light, window, step, fades, support) -> int:
-    """Adds a look to what speaks against each cell, and for those left out; how many are beyond the threshold."""
-    beyond = 0
+def _score(p, memory, means, sun_b, covariance, light, window, step, fades, support) -> tuple[int, int]:
+    """Adds a look to what speaks against each cell, and for those left out.
+
+    Gives how many are beyond the threshold, and how many are left out for what the others read.
+    """
+    beyond = doubted = 0
     for i in range(means.shape[0]):
         cell = memory.cells[i]
         if math.isnan(means[i]):
@@ -299,6 +313,8 @@ def _score(p, memory, means, sun_b, covariance, light, window, step, fades, supp
         if c < 0.0 and (fades or support == 0):
             continue
         change = (abs(c) - _FREE) * window
+        if _by_others(cell):
+            doubted += 1
         if cell.isolated == 1:
             add_look(p, cell, means[i], e.high)
             cell.kind = kind_of(cell, signal_of(cell))
@@ -320,13 +336,17 @@ def _score(p, memory, means, sun_b, covariance, light, window, step, fades, supp
             add_look(p, cell, means[i], e.high)
         if cell.score > p.threshold:
             beyond += 1
-    return beyond
+    return beyond, doubted
 
 
 @kernel
-def _clear_scores(memory: CellHealthMemory) -> None:
+def _trust_again(memory: CellHealthMemory) -> None:
+    """The direction was wrong: forgets what spoke against cells for its sake."""
     for i in range(memory.cells.shape[0]):
-        memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
+        cell = memory.cells[i]
+        if _by_others(cell):
+            cell.isolated = 0
+        cell.score, cell.first_step = 0.0, -1
 
 
 @kernel

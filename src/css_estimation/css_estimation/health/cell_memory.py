@@ -54,6 +54,7 @@ class CellHealthMemory(NamedTuple):
     grid: np.ndarray  # (DIRECTIONS,) logarithms of the weights of directions to the Sun
     means: np.ndarray  # (N,) outputs since the last look
     used: np.ndarray  # (N,) those of them that the direction rests on, NaN for others
+    judged: np.ndarray  # (N,) those that rival directions are held against: also of cells left out for the direction's sake
     trusted: np.ndarray  # (N,) outputs of this cycle, NaN for those that are left out
 
 
@@ -63,6 +64,7 @@ class CellHealthState(NamedTuple):
     phase: int  # PHASE_*
     since: float  # [s] of light in this phase
     lost: float  # how long most cells have contradicted the direction [s]
+    calm: float  # how long none has, while several saw the Sun [s]
     sun_b: Vec3
     covariance: Symmetric  # [rad^2]
     light: float  # [-] output over cosine, in common
@@ -82,4 +84,4 @@ def new_memory(cells: int) -> CellHealthMemory:
     """Nothing read yet."""
     watched = np.zeros(cells, WATCHED)
     watched["first_step"] = -1
-    return CellHealthMemory(watched, np.zeros(DIRECTIONS), *(np.zeros(cells) for _ in range(3)))
+    return CellHealthMemory(watched, np.zeros(DIRECTIONS), *(np.zeros(cells) for _ in range(4)))

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Sun that most cells agree on, over the whole sphere, whatever a few others say.
 
-The cost of a direction is the sum of the cells' contradictions to it, each bounded: a cell that lies costs as much
+The cost of a direction is the sum of the cells' misfits to it, each bounded: a cell that lies costs as much
 everywhere, and the direction of the others wins (truncated least squares, as RANSAC counts outliers).
 """
 
@@ -9,7 +9,7 @@ import math
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, dot, multiply
-from css_estimation.health.cell_expectation import SEEN, contradiction, expected
+from css_estimation.health.cell_expectation import HIDDEN, SEEN, contradiction, expected, misfit
 from css_estimation.health.cell_memory import DIRECTIONS, CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.direction_grid import direction
@@ -18,19 +18,20 @@ from css_estimation.symmetric import Symmetric, isotropic
 
 _HALF_WAY = 0.08  # [rad] from one direction to the next
 _REFINEMENTS = 3
+_FAR = 0.94  # cosine of 20 deg
 _DEAD = 0.05
-_BRIGHT = 0.45  # of the light: a cell above it sees the Sun, whatever is predicted
+_BRIGHT = 0.45  # of the light: a cell above it sees the Sun if it may
 _EARTH_ERROR = 0.1  # of an output, 1 sigma
 _LARGEST_VARIANCE = 1.0  # [rad^2]
 
 
 @kernel
 def cost(p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, light: float) -> float:
-    """Sum of contradictions to a direction; NaN outputs do not count."""
+    """Sum of misfits to a direction; NaN outputs do not count."""
     total = 0.0
     for i in range(outputs.shape[0]):
         if not math.isnan(outputs[i]):
-            total += abs(contradiction(p, expected(p, i, sun_b, covariance, light), outputs[i]))
+            total += misfit(p, expected(p, i, sun_b, covariance, light), outputs[i])
     return total
 
 
@@ -46,7 +47,7 @@ def refine(
         e = expected(p, i, prior_b, prior_covariance, light)
         if abs(contradiction(p, e, outputs[i])) > gate:
             continue
-        if outputs[i] > _BRIGHT * light or (e.sight == SEEN and outputs[i] > _DEAD):
+        if e.sight != HIDDEN and outputs[i] > (_DEAD if e.sight == SEEN else _BRIGHT * light):
             cell = p.layout.cells[i]
             variance = p.floor + p.share * outputs[i] * outputs[i] + _EARTH_ERROR * _EARTH_ERROR
             normal_b = (cell.nx, cell.ny, cell.nz)
@@ -64,10 +65,12 @@ def gather(p: CellHealthParameters, memory: CellHealthMemory, outputs, frame: Ma
 
 
 @kernel
-def best_direction(
+def best_rival(
     p: CellHealthParameters, outputs, light: float, sun_b: Vec3, variance: float, worth: float
 ) -> tuple[float, Vec3]:
-    """Least cost of any direction and the direction, where leaving the one followed costs too.
+    """Least cost of any direction far from the one followed, which costs for that, and the direction.
+
+    Infinite if the cells lead back from it to the one that is followed.
 
     Args:
         sun_b, variance: direction that is followed, and its error per axis [rad^2].
@@ -77,14 +80,15 @@ def best_direction(
     least, best = math.inf, sun_b
     for g in range(DIRECTIONS):
         d = direction(g, DIRECTIONS)
-        angle = math.acos(min(1.0, max(-1.0, dot(d, sun_b))))
-        away = max(0.0, angle - _HALF_WAY)
-        total = cost(p, outputs, d, covariance, light) + min(away * away / variance, worth)
-        if total < least:
-            least, best = total, d
+        if dot(d, sun_b) < _FAR:
+            total = cost(p, outputs, d, covariance, light)
+            if total < least:
+                least, best = total, d
     # as sure as the one that is followed, so that what contradicts it counts as much
-    best_covariance = covariance
     for _ in range(_REFINEMENTS):
-        best, best_covariance = refine(p, outputs, best, covariance, light, 2.0 * p.gate)
-    angle = math.acos(min(1.0, max(-1.0, dot(best, sun_b))))
-    return cost(p, outputs, best, best_covariance, light) + min(angle * angle / variance, worth), best
+        best, covariance = refine(p, outputs, best, covariance, light, 2.0 * p.gate)
+    along = dot(best, sun_b)
+    if along > _FAR:
+        return math.inf, best
+    angle = math.acos(max(-1.0, along))
+    return cost(p, outputs, best, covariance, light) + min(angle * angle / variance, worth), best
