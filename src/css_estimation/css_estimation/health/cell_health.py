@@ -74,6 +74,9 @@ _EARTH_ERROR = 0.1  # of an output, 1 sigma
 _LARGEST_VARIANCE = 1.0  # [rad^2]
 _BETTER = 10.0  # squared sigmas by which another direction has to explain all cells better
 _WORTH = 60.0  # squared sigmas that a direction is worth which has been followed with a measured rate
+_UNEXPLAINED = 5.0  # squared sigmas
+_CLEARLY = 5.0  # by which another direction explains better than one that is given up for it
+_EVERY = 4  # looks from one comparison with other directions to the next
 _CALM = 30.0  # [s] for so long without a contradiction
 _FADED = 0.75  # share of the light below which it sets
 _DEAD = 0.05
@@ -261,7 +264,7 @@ def _follow(p, memory, means, phase, since, lost, calm, sun_b, covariance, light
     prior_b, prior_covariance = sun_b, covariance
     settled = phase == PHASE_SETTLED
     if not fades:
-        sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, p.gate if settled else 2.0 * p.gate)
+        sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, p.gate if settled else 2.0 * p.gate, not settled)
     ratio_sum = ratio_weight = 0.0
     for i in range(means.shape[0]):
         e = expected(p, i, prior_b, prior_covariance, light)
@@ -277,15 +280,16 @@ def _follow(p, memory, means, phase, since, lost, calm, sun_b, covariance, light
     lost = lost + window if wrong else max(0.0, lost - window)
     if phase == PHASE_FOLLOWING and since > _SETTLED_AFTER and trace(covariance) < _SETTLED and not wrong:
         phase, since = PHASE_SETTLED, 0.0
-    calm = calm + window if against == 0 and support >= 2 and rate_known else max(0.0, calm - window)
+    here = cost(p, memory.judged, prior_b, prior_covariance, light)
+    unexplained = here > _UNEXPLAINED and not fades
+    calm = calm + window if not unexplained and support >= 2 and rate_known else max(0.0, calm - window)
     calm = min(calm, _CALM)
     if phase == PHASE_SETTLED:
         beyond, doubted = _score(p, memory, means, prior_b, prior_covariance, light, window, step, fades, support)
-        if (beyond > 0 or doubted > 0):
-            here = cost(p, memory.judged, prior_b, prior_covariance, light)
+        if beyond > 0 or ((doubted > 0 or unexplained) and int(since / _LOOK) % _EVERY == 0):
             variance = 0.5 * trace(prior_covariance) + p.heading
             there, rival = best_rival(p, memory.judged, light, prior_b, variance, _WORTH * calm / _CALM)
-            if there + _BETTER < here:
+            if there + _CLEARLY < here:
                 _trust_again(memory)
                 return PHASE_FOLLOWING, 0.0, 0.0, 0.0, rival, isotropic(0.03), light
             if beyond > 0 and here + _BETTER < there:

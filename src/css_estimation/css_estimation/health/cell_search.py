@@ -37,9 +37,13 @@ def cost(p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, l
 
 @kernel
 def refine(
-    p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, light: float, gate: float
+    p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, light: float, gate: float, open_minded: bool
 ) -> tuple[Vec3, Symmetric]:
-    """Direction and covariance after the cells that see the Sun and do not contradict it by more than `gate`."""
+    """Direction and covariance after the cells that see the Sun and do not contradict it by more than `gate`.
+
+    Args:
+        open_minded: it may be far from the Sun.
+    """
     prior_b, prior_covariance = sun_b, covariance
     for i in range(outputs.shape[0]):
         if math.isnan(outputs[i]):
@@ -47,7 +51,9 @@ def refine(
         e = expected(p, i, prior_b, prior_covariance, light)
         if abs(contradiction(p, e, outputs[i])) > gate:
             continue
-        if e.sight != HIDDEN and outputs[i] > (_DEAD if e.sight == SEEN else _BRIGHT * light):
+        # while the direction is no more than a guess, a bright cell sees the Sun whatever it says
+        may_see = e.sight != HIDDEN or open_minded
+        if may_see and outputs[i] > (_DEAD if e.sight == SEEN else _BRIGHT * light):
             cell = p.layout.cells[i]
             variance = p.floor + p.share * outputs[i] * outputs[i] + _EARTH_ERROR * _EARTH_ERROR
             normal_b = (cell.nx, cell.ny, cell.nz)
@@ -86,7 +92,7 @@ def best_rival(
                 least, best = total, d
     # as sure as the one that is followed, so that what contradicts it counts as much
     for _ in range(_REFINEMENTS):
-        best, covariance = refine(p, outputs, best, covariance, light, 2.0 * p.gate)
+        best, covariance = refine(p, outputs, best, covariance, light, 2.0 * p.gate, True)
     along = dot(best, sun_b)
     if along > _FAR:
         return math.inf, best
