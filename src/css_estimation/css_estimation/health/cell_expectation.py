@@ -20,6 +20,9 @@ _MOST = 25.0
 # Variance of the Earth's light where it is a guess, by the square of its bound: that is 2.5 sigma.
 _EARTH_SHARE = 0.16
 
+SURE = 3.0
+"""Sigmas of a direction that is followed within which the edge of a view is in doubt."""
+
 HIDDEN, DOUBTFUL, SEEN = 0, 1, 2
 
 
@@ -39,17 +42,20 @@ def _spread(normal_b: Vec3, cosine: float, covariance: Symmetric, heading: float
 
 
 @kernel
-def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric, light: float) -> Expected:
+def expected(
+    p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric, light: float, sigmas: float
+) -> Expected:
     """Of cell `i` with the Sun in a unit direction.
 
     Args:
         covariance: of the direction [rad^2]; the lasting error of headings comes on top.
         light: output at normal incidence [-].
+        sigmas: of the direction within which the edge of a view is in doubt.
     """
     cell = p.layout.cells[i]
     cosine = cosine_on(p.layout, i, sun_b)
     spread = _spread((cell.nx, cell.ny, cell.nz), cosine, covariance, p.heading)
-    margin = 3.0 * math.sqrt(spread)
+    margin = sigmas * math.sqrt(spread)
     inside = cosine - p.layout.cos_half_view
     view = SEEN
     if inside < -margin:
@@ -59,7 +65,7 @@ def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric
     if cell.side != 0.0 and view != HIDDEN:
         clip = p.layout.clip_normal_b
         component = dot(clip, sun_b)
-        room = 3.0 * math.sqrt(_spread(clip, component, covariance, p.heading))
+        room = sigmas * math.sqrt(_spread(clip, component, covariance, p.heading))
         above = component if cell.side > 0.0 else -component
         if above < -room:
             view = HIDDEN

@@ -11,6 +11,9 @@ from css_estimation.symmetric import Symmetric
 DIRECTIONS = 500
 """Directions among which the Sun is looked for: 9 deg from one to the next."""
 
+MOST_IN_PAIRS = 16
+"""Cells of a layout of which any two may fail together at the start; with more of them, one."""
+
 WATCHED = np.dtype(
     [
         ("last", np.float64),  # output of the last cycle
@@ -51,27 +54,37 @@ class CellHealthMemory(NamedTuple):
     """Of N cells; all written by `cell_health.watch_cells`."""
 
     cells: np.ndarray  # (N,) of WATCHED
-    grid: np.ndarray  # (DIRECTIONS,) logarithms of the weights of directions to the Sun
+    grid: np.ndarray  # (hypotheses, DIRECTIONS) logarithms of weights, see `cell_search`
+    misfits: np.ndarray  # (N,) room
+    against: np.ndarray  # (N,) evidence that a cell fails, as the search has it
+    healthy: np.ndarray  # (N,) room
     means: np.ndarray  # (N,) outputs since the last look
     used: np.ndarray  # (N,) those of them that the direction rests on, NaN for others
     judged: np.ndarray  # (N,) those that rival directions are held against: also of cells left out for the direction's sake
     trusted: np.ndarray  # (N,) outputs of this cycle, NaN for those that are left out
 
 
-class CellHealthState(NamedTuple):
-    """Beside the memory: the Sun as the cells together see it."""
+class Track(NamedTuple):
+    """The Sun as the cells together see it."""
 
     phase: int  # PHASE_*
     since: float  # [s] of light in this phase
-    lost: float  # how long most cells have contradicted the direction [s]
-    calm: float  # how long none has, while several saw the Sun [s]
+    lost: float  # [s] for how long most cells have contradicted the direction
+    calm: float  # [s] for how long all cells have been explained while several saw the Sun, at most a bound
+    doubt: float  # [s] for which the search goes on beside it
+    searched: float  # [s] since its last look
     sun_b: Vec3
     covariance: Symmetric  # [rad^2]
     light: float  # [-] output over cosine, in common
-    frame: Mat3  # from the frame in which directions of the grid are fixed to b
+    frame: Mat3  # from the frame in which directions of the search are fixed to b
+
+
+class CellHealthState(NamedTuple):
+    """Beside the memory."""
+
+    track: Track
     turn_b: Vec3  # [rad] since the last look
     window: float  # [s] since the last look
-    dark: float  # [s] without any light
     step: int  # number of this cycle
     isolated: int  # mask
     least_change: float  # [-] smallest change of any output from cycle to cycle: a step of the converter, or less
@@ -84,4 +97,5 @@ def new_memory(cells: int) -> CellHealthMemory:
     """Nothing read yet."""
     watched = np.zeros(cells, WATCHED)
     watched["first_step"] = -1
-    return CellHealthMemory(watched, np.zeros(DIRECTIONS), *(np.zeros(cells) for _ in range(4)))
+    hypotheses = 1 + cells + (cells * (cells - 1) // 2 if cells <= MOST_IN_PAIRS else 0)
+    return CellHealthMemory(watched, np.zeros((hypotheses, DIRECTIONS)), *(np.zeros(cells) for _ in range(7)))

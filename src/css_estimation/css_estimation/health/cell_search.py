@@ -1,28 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The Sun that most cells agree on, over the whole sphere, whatever a few others say.
+"""Where is the Sun, and which cells lie? Both at once, over the whole sphere, while neither is sure.
 
-The cost of a direction is the sum of the cells' misfits to it, each bounded: a cell that lies costs as much
-everywhere, and the direction of the others wins (truncated least squares, as RANSAC counts outliers).
+Hypotheses are that all cells are healthy, that one of them fails, or two. Under each the directions are weighed by what
+the cells that are healthy then read, look after look, in a frame that turns with the body; a cell that is said to fail
+costs as much as one that is off by a bound. The best direction of each hypothesis gives its likelihood, and the
+difference between the best with a cell failing and the best with it healthy is the evidence against the cell
+(generalised likelihood ratio).
 """
 
 import math
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, dot, multiply
-from css_estimation.health.cell_expectation import HIDDEN, SEEN, contradiction, expected, misfit
-from css_estimation.health.cell_memory import DIRECTIONS, CellHealthMemory
+from css_estimation.health.cell_expectation import HIDDEN, SEEN, SURE, contradiction, expected, misfit
+from css_estimation.health.cell_memory import DIRECTIONS, MOST_IN_PAIRS, CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.direction_grid import direction
 from css_estimation.sun.sunline_filter import constrain, update_cell
 from css_estimation.symmetric import Symmetric, isotropic
 
 _HALF_WAY = 0.08  # [rad] from one direction to the next
-_REFINEMENTS = 3
-_FAR = 0.94  # cosine of 20 deg
+_FAILED = 6.0  # squared sigmas that a failed cell costs
 _DEAD = 0.05
 _BRIGHT = 0.45  # of the light: a cell above it sees the Sun if it may
 _EARTH_ERROR = 0.1  # of an output, 1 sigma
 _LARGEST_VARIANCE = 1.0  # [rad^2]
+_NEAR, _FAR = 0.94, 0.87  # cosines of 20 and 30 deg
 
 
 @kernel
@@ -31,7 +34,7 @@ def cost(p: CellHealthParameters, outputs, sun_b: Vec3, covariance: Symmetric, l
     total = 0.0
     for i in range(outputs.shape[0]):
         if not math.isnan(outputs[i]):
-            total += misfit(p, expected(p, i, sun_b, covariance, light), outputs[i])
+            total += misfit(p, expected(p, i, sun_b, covariance, light, SURE), outputs[i])
     return total
 
 
@@ -48,7 +51,7 @@ def refine(
     for i in range(outputs.shape[0]):
         if math.isnan(outputs[i]):
             continue
-        e = expected(p, i, prior_b, prior_covariance, light)
+        e = expected(p, i, prior_b, prior_covariance, light, SURE)
         if abs(contradiction(p, e, outputs[i])) > gate:
             continue
         # while the direction is no more than a guess, a bright cell sees the Sun whatever it says
@@ -62,39 +65,102 @@ def refine(
 
 
 @kernel
-def gather(p: CellHealthParameters, memory: CellHealthMemory, outputs, frame: Mat3, light: float, kept: float) -> None:
-    """Adds a look to the weights of all directions, of which a share of the old is `kept`."""
-    covariance = isotropic(_HALF_WAY * _HALF_WAY)
-    for g in range(DIRECTIONS):
-        sun_b = multiply(frame, direction(g, DIRECTIONS))
-        memory.grid[g] = kept * memory.grid[g] - 0.5 * cost(p, outputs, sun_b, covariance, light)
+def begin_search(memory: CellHealthMemory) -> None:
+    """All hypotheses and directions alike."""
+    for h in range(memory.grid.shape[0]):
+        for g in range(DIRECTIONS):
+            memory.grid[h, g] = 0.0
 
 
 @kernel
-def best_rival(
-    p: CellHealthParameters, outputs, light: float, sun_b: Vec3, variance: float, worth: float
-) -> tuple[float, Vec3]:
-    """Least cost of any direction far from the one followed, which costs for that, and the direction.
-
-    Infinite if the cells lead back from it to the one that is followed.
-
-    Args:
-        sun_b, variance: direction that is followed, and its error per axis [rad^2].
-        worth: most that leaving it costs.
-    """
+def weigh(p: CellHealthParameters, memory: CellHealthMemory, outputs, frame: Mat3, light: float, kept: float) -> None:
+    """Adds a look to the weights of all hypotheses and directions, of which a share of the old is `kept`."""
+    count = outputs.shape[0]
     covariance = isotropic(_HALF_WAY * _HALF_WAY)
-    least, best = math.inf, sun_b
+    grid, off = memory.grid, memory.misfits
     for g in range(DIRECTIONS):
-        d = direction(g, DIRECTIONS)
-        if dot(d, sun_b) < _FAR:
-            total = cost(p, outputs, d, covariance, light)
-            if total < least:
-                least, best = total, d
-    # as sure as the one that is followed, so that what contradicts it counts as much
-    for _ in range(_REFINEMENTS):
-        best, covariance = refine(p, outputs, best, covariance, light, 2.0 * p.gate, True)
-    along = dot(best, sun_b)
-    if along > _FAR:
-        return math.inf, best
-    angle = math.acos(max(-1.0, along))
-    return cost(p, outputs, best, covariance, light) + min(angle * angle / variance, worth), best
+        sun_b = multiply(frame, direction(g, DIRECTIONS))
+        total = 0.0
+        for i in range(count):
+            off[i] = 0.0
+            if not math.isnan(outputs[i]):
+                off[i] = misfit(p, expected(p, i, sun_b, covariance, light, 1.0), outputs[i])
+            total += off[i]
+        grid[0, g] = kept * grid[0, g] - 0.5 * total
+        h = 1
+        for i in range(count):
+            grid[h, g] = kept * grid[h, g] - 0.5 * (total - off[i] + _FAILED)
+            h += 1
+        if count <= MOST_IN_PAIRS:
+            for i in range(count):
+                for j in range(i):
+                    grid[h, g] = kept * grid[h, g] - 0.5 * (total - off[i] - off[j] + 2.0 * _FAILED)
+                    h += 1
+
+
+@kernel
+def judge_hypotheses(memory: CellHealthMemory) -> tuple[float, int, int]:
+    """Likelihood, hypothesis and direction of the best; writes the evidence against each cell to `memory.against`."""
+    count = memory.against.shape[0]
+    best, best_h, best_g = -math.inf, 0, 0
+    for i in range(count):
+        memory.against[i] = memory.healthy[i] = -math.inf
+    h = 0
+    for i in range(-1, count):
+        top, g = _largest(memory.grid, h)
+        if top > best:
+            best, best_h, best_g = top, h, g
+        _credit(memory, top, i, -1)
+        h += 1
+    if count <= MOST_IN_PAIRS:
+        for i in range(count):
+            for j in range(i):
+                top, g = _largest(memory.grid, h)
+                if top > best:
+                    best, best_h, best_g = top, h, g
+                _credit(memory, top, i, j)
+                h += 1
+    for i in range(count):
+        memory.against[i] -= memory.healthy[i]
+    return best, best_h, best_g
+
+
+@kernel
+def _largest(grid, h: int) -> tuple[float, int]:
+    best, at = -math.inf, 0
+    for g in range(DIRECTIONS):
+        if grid[h, g] > best:
+            best, at = grid[h, g], g
+    return best, at
+
+
+@kernel
+def _credit(memory: CellHealthMemory, likelihood: float, i: int, j: int) -> None:
+    """Notes a hypothesis, in which cells `i` and `j` fail, for all cells."""
+    for k in range(memory.against.shape[0]):
+        if k in (i, j):
+            memory.against[k] = max(memory.against[k], likelihood)
+        else:
+            memory.healthy[k] = max(memory.healthy[k], likelihood)
+
+
+@kernel
+def likelihood_far(memory: CellHealthMemory, frame: Mat3, sun_b: Vec3) -> float:
+    """Of the best hypothesis with the Sun far from a direction."""
+    best = -math.inf
+    for g in range(DIRECTIONS):
+        if dot(multiply(frame, direction(g, DIRECTIONS)), sun_b) < _FAR:
+            for h in range(memory.grid.shape[0]):
+                best = max(best, memory.grid[h, g])
+    return best
+
+
+@kernel
+def likelihood_near(memory: CellHealthMemory, frame: Mat3, sun_b: Vec3) -> float:
+    """Of the best hypothesis with the Sun near a direction."""
+    best = -math.inf
+    for g in range(DIRECTIONS):
+        if dot(multiply(frame, direction(g, DIRECTIONS)), sun_b) > _NEAR:
+            for h in range(memory.grid.shape[0]):
+                best = max(best, memory.grid[h, g])
+    return best
