@@ -50,6 +50,7 @@ _FADED = 0.75  # share of the light below which it sets
 _LIGHT_MEMORY = 20.0  # [s]
 _UNEXPLAINED = 5.0  # squared sigmas of all cells together
 _DOUBT = 20.0  # [s]
+_WORTH = 60.0  # squared sigmas that a direction is worth which has been sure for long
 _CALM, _CALM_ENOUGH = 30.0, 10.0  # [s]
 
 
@@ -126,10 +127,13 @@ def looked(
         return _looking(p, memory, track, window, rate_known)
     seen = _seen(p, memory, track)
     settled = track.phase == PHASE_SETTLED
-    unexplained = cost(p, memory.judged, track.sun_b, track.covariance, track.light) > _UNEXPLAINED and not seen.fades
-    calm = track.calm - window
+    unexplained = cost(p, memory.used, track.sun_b, track.covariance, track.light) > _UNEXPLAINED and not seen.fades
+    # a direction on which most agree stays as sure as it was
+    calm = track.calm
     if not unexplained and seen.support >= 2 and rate_known:
-        calm = track.calm + window
+        calm += window
+    elif seen.against >= max(seen.support, 1) or not rate_known:
+        calm -= window
     calm = min(max(calm, 0.0), _CALM)
     sun_b, covariance = track.sun_b, track.covariance
     if not seen.fades:
@@ -149,7 +153,8 @@ def looked(
     doubt, searched, frame = track.doubt, track.searched, track.frame
     if unexplained:
         if doubt == 0.0:
-            begin_search(memory)
+            worth = _WORTH * track.calm / _CALM
+            begin_search(memory, track.sun_b, 0.5 * trace(track.covariance) + p.heading, worth)
             frame = IDENTITY
         doubt = _DOUBT
     else:
@@ -186,7 +191,7 @@ def _looking(
     """A look without a direction to follow."""
     frame, since, searched = track.frame, track.since, track.searched
     if since == 0.0:
-        begin_search(memory)
+        begin_search(memory, track.sun_b, 1.0, 0.0)
         frame, searched = IDENTITY, _SEARCH_EVERY + window
     since += window
     track = Track(
@@ -218,7 +223,7 @@ def _searching(
         cell = memory.cells[i]
         if cell.isolated == 0 and memory.against[i] > _GUILTY:
             leave_out(cell, memory.against[i], _GUILTY, step, window)
-        elif by_others(cell) and memory.against[i] < 0.0:
+        elif by_others(cell) and memory.against[i] < -_GUILTY:
             trust_again(cell)
     if best - likelihood_near(memory, track.frame, track.sun_b) > _ELSEWHERE:
         for i in range(memory.cells.shape[0]):

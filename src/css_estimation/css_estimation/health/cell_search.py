@@ -65,11 +65,19 @@ def refine(
 
 
 @kernel
-def begin_search(memory: CellHealthMemory) -> None:
-    """All hypotheses and directions alike."""
-    for h in range(memory.grid.shape[0]):
-        for g in range(DIRECTIONS):
-            memory.grid[h, g] = 0.0
+def begin_search(memory: CellHealthMemory, sun_b: Vec3, variance: float, worth: float) -> None:
+    """All hypotheses alike, and directions by how far they are from the one that was followed.
+
+    Args:
+        variance: of that, per axis [rad^2].
+        worth: most that a direction costs for being another [squared sigmas].
+    """
+    for g in range(DIRECTIONS):
+        angle = math.acos(max(-1.0, min(1.0, dot(direction(g, DIRECTIONS), sun_b))))
+        away = max(0.0, angle - _HALF_WAY)
+        start = -0.5 * min(away * away / variance, worth)
+        for h in range(memory.grid.shape[0]):
+            memory.grid[h, g] = start
 
 
 @kernel
