@@ -11,7 +11,6 @@ from css_common.vectors import Vec3, matmul, multiply, scale
 from css_estimation.health.cell_evidence import (
     SHOWS,
     by_others,
-    forget_scores,
     leave_out,
     leave_out_scored,
     score_cells,
@@ -40,11 +39,10 @@ _FIRST_SEARCH, _LONGEST_SEARCH = 2.0, 5.0  # [s] of light before a direction is 
 _CLEAR = 2.0  # logarithm of likelihoods by which a direction is found
 _ELSEWHERE = 6.0  # by which one is given up for another
 _GUILTY = 10.0  # by which a cell fails
-_KEPT, _KEPT_WITHOUT_RATE = 0.95, 0.5  # of weights from look to look of the search
+_KEPT, _KEPT_WITHOUT_RATE = 0.99, 0.8  # of weights from look to look of the search
 _START_VARIANCE = 0.03  # [rad^2]
 _SETTLED_AFTER = 3.0  # [s]
 _SETTLED = 0.03  # [rad^2] trace: 7 deg per axis
-_LOST_AFTER = 4.0  # [s]
 _BRIGHT = 0.45  # of the light
 _FADED = 0.75  # share of the light below which it sets
 _LIGHT_MEMORY = 20.0  # [s]
@@ -162,9 +160,6 @@ def looked(
     after = Track(phase, since, lost, calm, doubt, searched, sun_b, covariance, light, frame)
     if doubt > 0.0 and searched > _SEARCH_EVERY and not seen.fades:
         after = _searching(p, memory, after, rate_known, step, window)
-    if after.lost > _LOST_AFTER:
-        forget_scores(memory)
-        return Track(PHASE_LOOKING, 0.0, 0.0, 0.0, 0.0, 0.0, sun_b, covariance, light, frame)
     return after
 
 
