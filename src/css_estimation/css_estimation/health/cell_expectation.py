@@ -73,6 +73,8 @@ def expected(
             view = DOUBTFUL
     if view == HIDDEN:
         return Expected(0.0, 0.0, p.floor, view)
+    if p.screened >> i & 1:
+        view = DOUBTFUL
     high = light * max(0.0, cosine)
     low = high if view == SEEN else 0.0
     return Expected(low, high, p.floor + p.share * high * high + light * light * spread, view)

@@ -45,6 +45,7 @@ _SETTLED_AFTER = 3.0  # [s]
 _SETTLED = 0.03  # [rad^2] trace: 7 deg per axis
 _BRIGHT = 0.45  # of the light
 _FADED = 0.75  # share of the light below which it sets
+_LONGEST_FADE = 15.0  # [s] after which it does not
 _LIGHT_MEMORY = 20.0  # [s]
 _UNEXPLAINED = 5.0  # squared sigmas of all cells together
 _DOUBT = 20.0  # [s]
@@ -53,14 +54,14 @@ _CALM, _CALM_ENOUGH = 30.0, 10.0  # [s]
 
 
 @kernel
-def carried(track: Track, turn_b: Vec3, window: float, rate_known: bool) -> Track:
+def carried(track: Track, turn_b: Vec3, window: float, rate_sure: bool) -> Track:
     """The track at a look, before its outputs.
 
     Args:
         turn_b: [rad] of the body since the last look.
         window: [s] since then.
     """
-    noise = _NOISE if rate_known else _NOISE_WITHOUT_RATE
+    noise = _NOISE if rate_sure else _NOISE_WITHOUT_RATE
     mean_b = scale(1.0 / max(window, 1e-9), turn_b)
     sun_b, covariance = propagate(track.sun_b, track.covariance, mean_b, window, noise)
     phase, since, doubt = track.phase, track.since, track.doubt
@@ -68,7 +69,7 @@ def carried(track: Track, turn_b: Vec3, window: float, rate_known: bool) -> Trac
         phase, since, doubt = PHASE_LOOKING, 0.0, 0.0
     frame = matmul(rotation_vector_to_dcm(turn_b), track.frame)
     return Track(
-        phase, since, track.lost, track.calm, doubt, track.searched + window, sun_b, covariance, track.light, frame
+        phase, since, track.faded, track.calm, doubt, track.searched + window, sun_b, covariance, track.light, frame
     )
 
 
@@ -77,13 +78,23 @@ class _Seen(NamedTuple):
 
     support: int  # cells that see the Sun as expected
     against: int  # that contradict
-    fades: bool  # all that should be lit are darker than they should
+
+
+@kernel
+def _brightest_share(p: CellHealthParameters, memory: CellHealthMemory, track: Track) -> float:
+    """Largest share of what they should read that cells in the Sun read, at most 1; 1 when none is."""
+    share, lit = 0.0, False
+    for i in range(memory.used.shape[0]):
+        e = expected(p, i, track.sun_b, track.covariance, track.light, SURE)
+        # a NaN compares false
+        if e.sight == SEEN and e.high > SHOWS * track.light and memory.used[i] > -1.0:
+            share, lit = max(share, memory.used[i] / e.high), True
+    return min(share, 1.0) if lit else 1.0
 
 
 @kernel
 def _seen(p: CellHealthParameters, memory: CellHealthMemory, track: Track) -> _Seen:
-    support = against = lit = 0
-    share = 0.0
+    support = against = 0
     for i in range(memory.used.shape[0]):
         output = memory.used[i]
         if math.isnan(output):
@@ -93,10 +104,23 @@ def _seen(p: CellHealthParameters, memory: CellHealthMemory, track: Track) -> _S
             against += 1
         elif output > SHOWS * track.light and e.sight != HIDDEN:
             support += 1
-        if e.sight == SEEN and e.high > SHOWS * track.light:
-            lit += 1
-            share = max(share, output / e.high)
-    return _Seen(support, against, support == 0 and lit > 0 and share < _FADED)
+    return _Seen(support, against)
+
+
+@kernel
+def _with_light(track: Track, light: float) -> Track:
+    return Track(
+        track.phase,
+        track.since,
+        track.faded,
+        track.calm,
+        track.doubt,
+        track.searched,
+        track.sun_b,
+        track.covariance,
+        light,
+        track.frame,
+    )
 
 
 @kernel
@@ -118,33 +142,37 @@ def _light(p: CellHealthParameters, memory: CellHealthMemory, track: Track, wind
 
 @kernel
 def looked(
-    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_known: bool, step: int
+    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool, step: int
 ) -> Track:
     """The track after a look in the Sun."""
     if track.phase == PHASE_LOOKING:
-        return _looking(p, memory, track, window, rate_known)
-    seen = _seen(p, memory, track)
+        return _looking(p, memory, track, window, rate_sure)
+    # a Sun that sets, or rises, is dimmer for all alike, and not for long
+    share = _brightest_share(p, memory, track)
+    faded = track.faded + window if share < _FADED else 0.0
+    fades = 0.0 < faded < _LONGEST_FADE
+    dimmed = _with_light(track, track.light * share) if faded < _LONGEST_FADE else track
+    seen = _seen(p, memory, dimmed)
     settled = track.phase == PHASE_SETTLED
-    unexplained = cost(p, memory.used, track.sun_b, track.covariance, track.light) > _UNEXPLAINED and not seen.fades
+    unexplained = cost(p, memory.used, track.sun_b, track.covariance, track.light) > _UNEXPLAINED and not fades
     # a direction on which most agree stays as sure as it was
     calm = track.calm
-    if not unexplained and seen.support >= 2 and rate_known:
+    if not unexplained and seen.support >= 2 and rate_sure:
         calm += window
-    elif seen.against >= max(seen.support, 1) or not rate_known:
+    elif seen.against >= max(seen.support, 1) or not rate_sure:
         calm -= window
     calm = min(max(calm, 0.0), _CALM)
-    sun_b, covariance = track.sun_b, track.covariance
-    if not seen.fades:
+    sun_b, covariance, light = track.sun_b, track.covariance, track.light
+    if not fades:
         gate = p.gate if settled else 2.0 * p.gate
-        sun_b, covariance = refine(p, memory.used, sun_b, covariance, track.light, gate, not settled)
-    light = _light(p, memory, track, window)
+        sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, gate, not settled)
+        light = _light(p, memory, track, window)
     if settled:
-        beyond = score_cells(p, memory, track, window, step, seen.support > 0 and not seen.fades)
+        beyond = score_cells(p, memory, dimmed, window, step, seen.support > 0 and not fades)
         # a direction that has been right for long is
         if beyond > 0 and track.calm >= _CALM_ENOUGH:
             leave_out_scored(p, memory, step, window)
-    wrong = seen.against > 0 and seen.against >= seen.support and not seen.fades
-    lost = track.lost + window if wrong else max(0.0, track.lost - window)
+    wrong = seen.against > 0 and seen.against >= seen.support and not fades
     phase, since = track.phase, track.since + window
     if not settled and since > _SETTLED_AFTER and trace(covariance) < _SETTLED and not wrong:
         phase, since = PHASE_SETTLED, 0.0
@@ -157,9 +185,9 @@ def looked(
         doubt = _DOUBT
     else:
         doubt = max(0.0, doubt - window)
-    after = Track(phase, since, lost, calm, doubt, searched, sun_b, covariance, light, frame)
-    if doubt > 0.0 and searched > _SEARCH_EVERY and not seen.fades:
-        after = _searching(p, memory, after, rate_known, step, window)
+    after = Track(phase, since, faded, calm, doubt, searched, sun_b, covariance, light, frame)
+    if doubt > 0.0 and searched > _SEARCH_EVERY and not fades:
+        after = _searching(p, memory, after, rate_sure, step, window)
     return after
 
 
@@ -171,9 +199,9 @@ def _found(track: Track, sun_b: Vec3, phase: int) -> Track:
 
 
 @kernel
-def _weighed(p: CellHealthParameters, memory: CellHealthMemory, track: Track, rate_known: bool) -> tuple[float, Vec3]:
+def _weighed(p: CellHealthParameters, memory: CellHealthMemory, track: Track, rate_sure: bool) -> tuple[float, Vec3]:
     """Likelihood of the best hypothesis after a look of the search, and its direction to the Sun."""
-    kept = _KEPT if rate_known else _KEPT_WITHOUT_RATE
+    kept = _KEPT if rate_sure else _KEPT_WITHOUT_RATE
     weigh(p, memory, memory.judged, track.frame, track.light, kept)
     best, _, g = judge_hypotheses(memory)
     return best, multiply(track.frame, direction(g, DIRECTIONS))
@@ -181,7 +209,7 @@ def _weighed(p: CellHealthParameters, memory: CellHealthMemory, track: Track, ra
 
 @kernel
 def _looking(
-    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_known: bool
+    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool
 ) -> Track:
     """A look without a direction to follow."""
     frame, since, searched = track.frame, track.since, track.searched
@@ -194,7 +222,7 @@ def _looking(
     )
     if searched <= _SEARCH_EVERY:
         return track
-    best, sun_b = _weighed(p, memory, track, rate_known)
+    best, sun_b = _weighed(p, memory, track, rate_sure)
     elsewhere = likelihood_far(memory, track.frame, sun_b)
     if since >= _FIRST_SEARCH and (best - elsewhere > _CLEAR or since > _LONGEST_SEARCH):
         return _found(track, sun_b, PHASE_FOLLOWING)
@@ -208,12 +236,12 @@ def _searching(
     p: CellHealthParameters,
     memory: CellHealthMemory,
     track: Track,
-    rate_known: bool,
+    rate_sure: bool,
     step: int,
     window: float,
 ) -> Track:
     """A look of the search beside a direction that is followed."""
-    best, sun_b = _weighed(p, memory, track, rate_known)
+    best, sun_b = _weighed(p, memory, track, rate_sure)
     for i in range(memory.cells.shape[0]):
         cell = memory.cells[i]
         if cell.isolated == 0 and memory.against[i] > _GUILTY:
@@ -227,7 +255,7 @@ def _searching(
     return Track(
         track.phase,
         track.since,
-        track.lost,
+        track.faded,
         track.calm,
         track.doubt,
         0.0,

@@ -34,7 +34,7 @@ from css_estimation.health.cell_memory import (
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.cell_signals import in_range, is_reading, note_outputs
 from css_estimation.health.sight import Sight
-from css_estimation.sun.sun_heading import Sky
+from css_estimation.sun.sun_heading import RATE_GYRO, RATE_MOMENTUM, RATE_NONE, Sky
 from css_estimation.symmetric import isotropic, trace
 
 _LOOK = 0.499  # [s]
@@ -63,7 +63,7 @@ def watch_cells(
     dt: float,
     voltages,
     omega_bn_b: Vec3,
-    rate_known: bool,
+    rate_source: int,
     sky: Sky,
 ) -> CellHealthState:
     """One cycle; writes the outputs that can be trusted to `memory.trusted`, NaN for the others.
@@ -71,16 +71,19 @@ def watch_cells(
     Args:
         dt: [s] since the last cycle; 0 when it is not known.
         voltages: (N,) [-], NaN where one is missing.
-        omega_bn_b, rate_known: body rate [rad/s], by a gyro or an estimator.
+        omega_bn_b, rate_source: body rate [rad/s] and where it comes from, RATE_*.
         sky: of the flight's models.
     """
+    rate_known = rate_source != RATE_NONE
+    # what successive directions to the Sun make of the rate is no news of it
+    rate_sure = rate_source in (RATE_GYRO, RATE_MOMENTUM)
     rate = norm(omega_bn_b) if rate_known else 0.0
     least_change = note_outputs(p, memory, voltages, dt, rate, state.least_change)
     turn_b = add(state.turn_b, scale(dt, omega_bn_b)) if rate_known else state.turn_b
     window, step = state.window + dt, state.step + 1
     track, isolated = state.track, state.isolated
     if window > _LOOK or step == 1:
-        track = _look(p, memory, carried(track, turn_b, window, rate_known), window, rate_known, step, sky)
+        track = _look(p, memory, carried(track, turn_b, window, rate_sure), window, rate_sure, step, sky)
         isolated = isolated_mask(memory)
         turn_b, window = _ZERO, 0.0
     for i in range(voltages.shape[0]):
@@ -96,7 +99,7 @@ def _look(
     memory: CellHealthMemory,
     track: Track,
     window: float,
-    rate_known: bool,
+    rate_sure: bool,
     step: int,
     sky: Sky,
 ) -> Track:
@@ -116,7 +119,7 @@ def _look(
     night = sky.known and sky.illumination <= 0.0
     if night:
         judge_in_the_dark(p, memory, window, step)
-    elif top > p.minimum:
-        track = looked(p, memory, track, window, rate_known, step)
+    elif top > p.minimum and not (sky.known and sky.illumination < 1.0):
+        track = looked(p, memory, track, window, rate_sure, step)
     judge_signals(p, memory, track, step)
     return track

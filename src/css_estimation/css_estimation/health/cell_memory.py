@@ -21,6 +21,7 @@ WATCHED = np.dtype(
         ("sum", np.float64),  # of outputs since the last look
         ("readings", np.int64),  # in it
         ("same", np.float64),  # how unlikely it is that a healthy one has read the same for so long, -ln
+        ("top", np.float64),  # largest output in range
         ("ripple", np.float64),  # mean size of its second differences
         ("jumps", np.float64),  # recent cycles in which it leapt
         ("out_of_range", np.float64),  # recent cycles
@@ -69,7 +70,7 @@ class Track(NamedTuple):
 
     phase: int  # PHASE_*
     since: float  # [s] of light in this phase
-    lost: float  # [s] for how long most cells have contradicted the direction
+    faded: float  # [s] for how long all that should be lit have been darker than they should
     calm: float  # [s] for how long all cells have been explained while several saw the Sun, at most a bound
     doubt: float  # [s] for which the search goes on beside it
     searched: float  # [s] since its last look

@@ -22,6 +22,7 @@ _KEPT = 0.9  # of counts of recent cycles
 _MOST_LEAPS, _MOST_OUT_OF_RANGE = 3.5, 2.5
 _UNLIKELY = 14.0  # -ln of a chance of 1e-6
 _LIT = 0.1  # output above which a cell tells how others change
+_FULL = 0.9  # above it the largest output that any cell has had may be the converter's
 _DARK = 0.05  # below which nothing need change
 _STEPS = 3.0  # of a converter that the ripple of others has to exceed before an output has to change
 
@@ -74,8 +75,13 @@ def note_outputs(
         rate: [rad/s] at which the body turns, as far as it is known.
     """
     turn = max(rate, _FASTEST) * dt
+    top = 0.0
     for i in range(voltages.shape[0]):
         cell, v = memory.cells[i], voltages[i]
+        # a NaN compares false
+        if v > cell.top and in_range(p, v):
+            cell.top = v
+        top = max(top, cell.top)
         if is_reading(v) and is_reading(cell.last):
             change = abs(v - cell.last)
             if change > 0.0:
@@ -95,7 +101,7 @@ def note_outputs(
                 cell.ripple = 0.95 * cell.ripple + 0.05 * min(second, _LEAP_SHARE * largest)
             if v != cell.last:
                 cell.same = 0.0
-            elif v > _DARK:
+            elif v > _DARK and not (v == top and v > _FULL):
                 cell.same += _surprise(memory, voltages, i, least_change)
             cell.sum += v
             cell.readings += 1

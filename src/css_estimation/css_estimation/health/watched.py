@@ -16,8 +16,8 @@ from css_estimation.health.cell_health import watch_cells
 from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun import heading_dispatch
-from css_estimation.sun.sun_heading import RATE_NONE, SunHeading
-from css_estimation.sun.sun_tracking import elapsed
+from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, SunHeading
+from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS)
 _cell_parameters = builder(CellHealthParameters)
@@ -27,6 +27,7 @@ class Watched(NamedTuple):
     """Parameters."""
 
     cells: CellHealthParameters
+    use_gyro: bool
     own: Any  # of the algorithm
 
 
@@ -35,7 +36,7 @@ class WatchedState(NamedTuple):
 
     cells: CellHealthState
     omega_bn_b: Vec3  # [rad/s] of the last heading
-    rate_known: bool
+    rate_source: int  # of that
     own: Any
 
 
@@ -49,14 +50,15 @@ class WatchedMemory(NamedTuple):
 def watched_parameters(algorithm: Any, values: Values) -> Any:
     """Parameters of an algorithm, behind the health of its sensors unless that is switched off."""
     own = algorithm.parameters(values)
-    return Watched(_cell_parameters(values), own) if values[ENABLED] else own
+    use_gyro = bool(values[USE_GYRO]) if USE_GYRO in values else False
+    return Watched(_cell_parameters(values), use_gyro, own) if values[ENABLED] else own
 
 
 def initial_state(algorithm: Any, p: Any) -> Any:
     """State for parameters of `watched_parameters`."""
     if not isinstance(p, Watched):
         return algorithm.initial_state(p)
-    return WatchedState(cell_health.initial_state(), (0.0, 0.0, 0.0), False, algorithm.initial_state(p.own))
+    return WatchedState(cell_health.initial_state(), (0.0, 0.0, 0.0), RATE_NONE, algorithm.initial_state(p.own))
 
 
 def initial_memory(algorithm: Any, p: Any) -> Any:
@@ -68,7 +70,8 @@ def initial_memory(algorithm: Any, p: Any) -> Any:
 
 def watched_heading(p, state, memory, dt, voltages, aiding):
     """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
-    gyro_speaks = aiding.gyro_valid
+    gyro_speaks = p.use_gyro and aiding.gyro_valid
+    source = RATE_GYRO if gyro_speaks else state.rate_source
     omega_bn_b = aiding.gyro_b if gyro_speaks else state.omega_bn_b
     cells = watch_cells(
         p.cells,
@@ -77,7 +80,7 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         elapsed(dt),
         voltages,
         omega_bn_b,
-        gyro_speaks or state.rate_known,
+        source,
         aiding.sky,
     )
     own, said = heading_dispatch.estimate_heading(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
@@ -96,4 +99,4 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         cells.isolated,
         0,
     )
-    return WatchedState(cells, said.omega_bn_b, said.rate_source != RATE_NONE, own), heading
+    return WatchedState(cells, said.omega_bn_b, said.rate_source, own), heading
