@@ -78,13 +78,14 @@ def forget_scores(memory: CellHealthMemory) -> None:
 
 @kernel
 def score_cells(
-    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, step: int, dark_tells: bool
+    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, step: int, share: float, dark_tells: bool
 ) -> int:
     """Adds a look to what speaks against each cell, and for those left out; how many are beyond the threshold.
 
     Args:
         track: before the update by this look.
         window: [s] since the look before.
+        share: of the light that is left on all cells.
         dark_tells: that a cell reads too little is not the light's fault.
     """
     beyond = 0
@@ -93,7 +94,7 @@ def score_cells(
         if math.isnan(output):
             continue
         e = expected(p, i, track.sun_b, track.covariance, track.light, SURE)
-        c = contradiction(p, e, output)
+        c = contradiction(p, e, output, share)
         if c < 0.0 and not dark_tells:
             continue
         if cell.isolated == 1:

@@ -94,12 +94,16 @@ def misfit(p: CellHealthParameters, e: Expected, output: float) -> float:
 
 
 @kernel
-def contradiction(p: CellHealthParameters, e: Expected, output: float) -> float:
-    """Squared sigmas by which an output is outside of what is expected, with its sign, bounded."""
+def contradiction(p: CellHealthParameters, e: Expected, output: float, share: float) -> float:
+    """Squared sigmas by which an output is outside of what is expected, with its sign, bounded.
+
+    Args:
+        share: of the light that is left on all cells.
+    """
     off = 0.0
     if output > e.high + p.earth:
         off = output - e.high - p.earth
-    elif output < e.low:
-        off = output - e.low
+    elif output < share * e.low:
+        off = output - share * e.low
     squared = min(off * off / e.variance, _MOST)
     return squared if off > 0.0 else -squared

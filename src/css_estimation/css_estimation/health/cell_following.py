@@ -16,7 +16,7 @@ from css_estimation.health.cell_evidence import (
     score_cells,
     trust_again,
 )
-from css_estimation.health.cell_expectation import HIDDEN, SEEN, SURE, contradiction, expected
+from css_estimation.health.cell_expectation import DOUBTFUL, HIDDEN, SEEN, SURE, contradiction, expected
 from css_estimation.health.cell_memory import (
     DIRECTIONS,
     PHASE_FOLLOWING,
@@ -86,41 +86,27 @@ def _brightest_share(p: CellHealthParameters, memory: CellHealthMemory, track: T
     share, lit = 0.0, False
     for i in range(memory.used.shape[0]):
         e = expected(p, i, track.sun_b, track.covariance, track.light, SURE)
+        output = memory.used[i]
         # a NaN compares false
-        if e.sight == SEEN and e.high > SHOWS * track.light and memory.used[i] > -1.0:
-            share, lit = max(share, memory.used[i] / e.high), True
+        seen = e.sight == SEEN and output > -1.0
+        if e.high > SHOWS * track.light and (seen or (e.sight == DOUBTFUL and output > SHOWS)):
+            share, lit = max(share, output / e.high), True
     return min(share, 1.0) if lit else 1.0
 
 
 @kernel
-def _seen(p: CellHealthParameters, memory: CellHealthMemory, track: Track) -> _Seen:
+def _seen(p: CellHealthParameters, memory: CellHealthMemory, track: Track, share: float) -> _Seen:
     support = against = 0
     for i in range(memory.used.shape[0]):
         output = memory.used[i]
         if math.isnan(output):
             continue
         e = expected(p, i, track.sun_b, track.covariance, track.light, SURE)
-        if abs(contradiction(p, e, output)) > p.gate:
+        if abs(contradiction(p, e, output, share)) > p.gate:
             against += 1
         elif output > SHOWS * track.light and e.sight != HIDDEN:
             support += 1
     return _Seen(support, against)
-
-
-@kernel
-def _with_light(track: Track, light: float) -> Track:
-    return Track(
-        track.phase,
-        track.since,
-        track.faded,
-        track.calm,
-        track.doubt,
-        track.searched,
-        track.sun_b,
-        track.covariance,
-        light,
-        track.frame,
-    )
 
 
 @kernel
@@ -131,7 +117,7 @@ def _light(p: CellHealthParameters, memory: CellHealthMemory, track: Track, wind
         e = expected(p, i, track.sun_b, track.covariance, track.light, SURE)
         # a NaN compares false
         sees = e.sight == SEEN and memory.used[i] > _BRIGHT * track.light
-        if sees and abs(contradiction(p, e, memory.used[i])) <= p.gate:
+        if sees and abs(contradiction(p, e, memory.used[i], 1.0)) <= p.gate:
             total += memory.used[i] * e.high
             weight += e.high * e.high
     if not weight > 0.0:
@@ -151,8 +137,9 @@ def looked(
     share = _brightest_share(p, memory, track)
     faded = track.faded + window if share < _FADED else 0.0
     fades = 0.0 < faded < _LONGEST_FADE
-    dimmed = _with_light(track, track.light * share) if faded < _LONGEST_FADE else track
-    seen = _seen(p, memory, dimmed)
+    if faded >= _LONGEST_FADE:
+        share = 1.0
+    seen = _seen(p, memory, track, share)
     settled = track.phase == PHASE_SETTLED
     unexplained = cost(p, memory.used, track.sun_b, track.covariance, track.light) > _UNEXPLAINED and not fades
     # a direction on which most agree stays as sure as it was
@@ -168,7 +155,7 @@ def looked(
         sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, gate, not settled)
         light = _light(p, memory, track, window)
     if settled:
-        beyond = score_cells(p, memory, dimmed, window, step, seen.support > 0 and not fades)
+        beyond = score_cells(p, memory, track, window, step, share, seen.support > 0 and not fades)
         # a direction that has been right for long is
         if beyond > 0 and track.calm >= _CALM_ENOUGH:
             leave_out_scored(p, memory, step, window)

@@ -52,7 +52,7 @@ def refine(
         if math.isnan(outputs[i]):
             continue
         e = expected(p, i, prior_b, prior_covariance, light, SURE)
-        if abs(contradiction(p, e, outputs[i])) > gate:
+        if abs(contradiction(p, e, outputs[i], 1.0)) > gate:
             continue
         # while the direction is no more than a guess, a bright cell sees the Sun whatever it says
         may_see = e.sight != HIDDEN or open_minded
