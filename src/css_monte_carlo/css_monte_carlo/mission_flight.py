@@ -251,13 +251,19 @@ class MissionFlight:
             attitude_hears_field=attitude_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),
             attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
-            heading=None if heading is None else watched.watched_parameters(_algorithm(self._heading), heading),
+            heading=self._heading_parameters(heading),
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
             tachometer=tachometer.parameters(plant),
             array_normal_b=(x, y, z),
         )
+
+    def _heading_parameters(self, values: Values | None) -> Any:
+        """Of the Sun estimator behind the health of its sensors, None without one."""
+        if self._heading is None or values is None:
+            return None
+        return watched.watched_parameters(_algorithm(self._heading), values)
 
     def _sensors(self, values: dict[str, Values], done: list[Event], field_is_heard: bool) -> Sensors:
         array = values[self._array.name]

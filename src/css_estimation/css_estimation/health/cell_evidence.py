@@ -7,20 +7,30 @@ that a cell has failed.
 
 import math
 
+from css_common.health import (
+    EVIDENCE_DARK,
+    EVIDENCE_DEAD,
+    EVIDENCE_NOISE,
+    EVIDENCE_RANGE,
+    EVIDENCE_RESIDUAL,
+    EVIDENCE_STUCK,
+    KIND_SWAPPED,
+    hold,
+    release,
+    rename,
+)
 from css_common.kernel import kernel
-from css_estimation.health.cell_expectation import SEEN, SURE, contradiction, expected
-from css_estimation.health.cell_kinds import add_look, forget_sums, kind_of
-from css_estimation.health.cell_memory import PHASE_SETTLED, CellHealthMemory, Track
+from css_estimation.health.cell_expectation import DOUBTFUL, SEEN, SURE, Expected, contradiction, expected
+from css_estimation.health.cell_kinds import forget_sums, is_swapped, kind_of
+from css_estimation.health.cell_memory import (
+    LEAPING,
+    NO_SIGNAL,
+    OUT_OF_RANGE,
+    CellHealthMemory,
+    Track,
+)
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.health.cell_signals import LEAPING, NO_SIGNAL, OUT_OF_RANGE, signal_of, statistic_of
-
-# The numbers of css_msgs/Health.
-EVIDENCE_RANGE = 0
-EVIDENCE_STUCK = 1
-EVIDENCE_DEAD = 2
-EVIDENCE_NOISE = 3
-EVIDENCE_RESIDUAL = 6
-EVIDENCE_DARK = 8
+from css_estimation.health.cell_signals import signal_of, statistic_of
 
 _FREE = 4.0  # squared sigmas that a healthy cell is off
 _MOST_SCORE = 60.0
@@ -32,48 +42,65 @@ _MOST_TIMES = 4
 
 
 @kernel
-def in_use(cell) -> bool:
+def in_use(memory: CellHealthMemory, i: int) -> bool:
     """Whether the common direction rests on a cell."""
-    return cell.isolated == 0 and cell.out_of_range == 0.0
+    return memory.verdicts[i].held == 0 and memory.cells[i].out_of_range == 0.0
 
 
 @kernel
-def by_others(cell) -> bool:
+def by_others(memory: CellHealthMemory, i: int) -> bool:
     """Whether a cell is left out for what others read, not for what it shows by itself."""
-    return cell.isolated == 1 and (cell.evidence == EVIDENCE_DEAD or cell.evidence == EVIDENCE_RESIDUAL)
+    verdict = memory.verdicts[i]
+    return verdict.held == 1 and (verdict.evidence == EVIDENCE_DEAD or verdict.evidence == EVIDENCE_RESIDUAL)
 
 
 @kernel
 def isolated_mask(memory: CellHealthMemory) -> int:
     """Bit i: cell i is left out."""
     mask = 0
-    for i in range(memory.cells.shape[0]):
-        if memory.cells[i].isolated == 1:
+    for i in range(memory.verdicts.shape[0]):
+        if memory.verdicts[i].held == 1:
             mask |= 1 << i
     return mask
 
 
 @kernel
-def _leave_out(cell, evidence: int, statistic: float, threshold: float, since_step: int) -> None:
-    cell.isolated, cell.good = 1, 0.0
+def _leave_out(
+    p: CellHealthParameters,
+    memory: CellHealthMemory,
+    i: int,
+    evidence: int,
+    statistic: float,
+    threshold: float,
+    since_step: int,
+) -> None:
+    cell = memory.cells[i]
+    cell.good = 0.0
     cell.times = min(cell.times + 1, _MOST_TIMES)
-    cell.evidence, cell.statistic, cell.threshold, cell.since_step = evidence, statistic, threshold, since_step
+    hold(memory.verdicts[i], kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
 
 
 @kernel
-def trust_again(cell) -> None:
+def _begin_sums(memory: CellHealthMemory, i: int) -> None:
+    forget_sums(memory.cells[i])
+    memory.swap_looks[i] = 0.0
+    for j in range(memory.cells.shape[0]):
+        memory.swaps[i, j] = 0.0
+
+
+@kernel
+def trust_again(memory: CellHealthMemory, i: int) -> None:
     """Uses a cell as if nothing had been."""
-    cell.isolated, cell.score, cell.first_step, cell.same = 0, 0.0, -1, 0.0
+    release(memory.verdicts[i])
+    cell = memory.cells[i]
+    cell.score, cell.first_step, cell.same = 0.0, -1, 0.0
 
 
 @kernel
 def forget_scores(memory: CellHealthMemory) -> None:
-    """The direction was wrong: forgets what spoke against cells for its sake."""
+    """The direction was wrong: forgets what has begun to speak against cells for its sake."""
     for i in range(memory.cells.shape[0]):
-        cell = memory.cells[i]
-        if by_others(cell):
-            trust_again(cell)
-        cell.score, cell.first_step = 0.0, -1
+        memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
 
 
 @kernel
@@ -97,8 +124,9 @@ def score_cells(
         c = contradiction(p, e, output, share)
         if c < 0.0 and not dark_tells:
             continue
-        if cell.isolated == 1:
-            _judge_on(p, cell, output, e.high, e.sight == SEEN, abs(c), window)
+        cell.predicted = e.high if e.sight != DOUBTFUL else math.nan
+        if memory.verdicts[i].held == 1:
+            _judge_on(p, memory, i, output, e, abs(c), window)
             continue
         cell.score = min(max(0.0, cell.score + (abs(c) - _FREE) * window), _MOST_SCORE)
         if cell.score == 0.0:
@@ -106,8 +134,7 @@ def score_cells(
             continue
         if cell.first_step < 0:
             cell.first_step = step
-            forget_sums(cell)
-        add_look(p, cell, output, e.high)
+            _begin_sums(memory, i)
         if cell.score > p.threshold:
             beyond += 1
     return beyond
@@ -115,46 +142,52 @@ def score_cells(
 
 @kernel
 def _judge_on(
-    p: CellHealthParameters, cell, output: float, predicted: float, seen: bool, off: float, window: float
+    p: CellHealthParameters, memory: CellHealthMemory, i: int, output: float, e: Expected, off: float, window: float
 ) -> None:
     """A cell that is left out: what it looks like, and whether it agrees again."""
-    add_look(p, cell, output, predicted)
+    cell = memory.cells[i]
+    memory.swap_looks[i] += 1.0
+    for j in range(memory.cells.shape[0]):
+        predicted = memory.cells[j].predicted
+        # where nothing is known of the other, nothing can be compared
+        memory.swaps[i, j] += abs(output - predicted) if not math.isnan(predicted) else 0.0
     signal = signal_of(cell)
-    cell.kind = kind_of(cell, signal)
+    rename(memory.verdicts[i], KIND_SWAPPED if is_swapped(memory, i) else kind_of(p, cell, signal))
     if signal != NO_SIGNAL or off > _AGREES:
         cell.good = 0.0
-    elif seen and max(output, predicted) > SHOWS:
+    elif e.sight == SEEN and max(output, e.high) > SHOWS:
         cell.good += window
     if cell.good >= p.return_time * 2.0 ** (cell.times - 1):
-        trust_again(cell)
+        trust_again(memory, i)
 
 
 @kernel
-def leave_out(cell, statistic: float, threshold: float, step: int, window: float) -> None:
+def leave_out(
+    p: CellHealthParameters, memory: CellHealthMemory, i: int, statistic: float, threshold: float, step: int
+) -> None:
     """Leaves a cell out for what the others read."""
-    evidence = EVIDENCE_DEAD if cell.read / max(cell.weight, 1.0) < _DEAD else EVIDENCE_RESIDUAL
+    cell = memory.cells[i]
+    evidence = EVIDENCE_DEAD if cell.read < _DEAD * max(cell.cycles, 1.0) else EVIDENCE_RESIDUAL
     since = cell.first_step if cell.first_step >= 0 else step
-    _leave_out(cell, evidence, statistic, threshold, since)
-    cell.onset = cell.weight * window
-    cell.kind = kind_of(cell, signal_of(cell))
+    _leave_out(p, memory, i, evidence, statistic, threshold, since)
 
 
 @kernel
-def leave_out_scored(p: CellHealthParameters, memory: CellHealthMemory, step: int, window: float) -> None:
+def leave_out_scored(p: CellHealthParameters, memory: CellHealthMemory, step: int) -> None:
     """Leaves out all cells whose score is beyond the threshold."""
     for i in range(memory.cells.shape[0]):
-        cell = memory.cells[i]
-        if cell.isolated == 0 and cell.score > p.threshold:
-            leave_out(cell, cell.score, p.threshold, step, window)
+        score = memory.cells[i].score
+        if memory.verdicts[i].held == 0 and score > p.threshold:
+            leave_out(p, memory, i, score, p.threshold, step)
 
 
 @kernel
-def judge_signals(p: CellHealthParameters, memory: CellHealthMemory, track: Track, step: int) -> None:
+def judge_signals(p: CellHealthParameters, memory: CellHealthMemory, step: int) -> None:
     """Leaves out cells that show by themselves that they fail."""
     for i in range(memory.cells.shape[0]):
-        cell = memory.cells[i]
+        cell, held = memory.cells[i], memory.verdicts[i].held == 1
         # one that others spoke against may show what it is later
-        if (cell.isolated == 1 and not by_others(cell)) or math.isnan(cell.last):
+        if (held and not by_others(memory, i)) or math.isnan(cell.last):
             continue
         signal = signal_of(cell)
         if signal == NO_SIGNAL:
@@ -165,14 +198,9 @@ def judge_signals(p: CellHealthParameters, memory: CellHealthMemory, track: Trac
             evidence = EVIDENCE_RANGE
         elif signal == LEAPING:
             evidence = EVIDENCE_NOISE
-        if cell.isolated == 0:
-            forget_sums(cell)
-            settled = track.phase == PHASE_SETTLED
-            predicted = expected(p, i, track.sun_b, track.covariance, track.light, SURE).high if settled else 0.0
-            add_look(p, cell, cell.last, predicted)
-            cell.onset = 0.0
-        _leave_out(cell, evidence, statistic, threshold, step)
-        cell.kind = kind_of(cell, signal)
+        if not held:
+            _begin_sums(memory, i)
+        _leave_out(p, memory, i, evidence, statistic, threshold, step)
 
 
 @kernel
@@ -180,8 +208,9 @@ def judge_in_the_dark(p: CellHealthParameters, memory: CellHealthMemory, window:
     """Light where there is none, neither of the Sun nor of the Earth."""
     for i in range(memory.cells.shape[0]):
         cell, output = memory.cells[i], memory.means[i]
-        if cell.isolated == 1 or math.isnan(output):
+        if memory.verdicts[i].held == 1 or math.isnan(output):
             continue
+        cell.predicted = 0.0
         squared = min(output * output / (p.floor + p.noise * p.noise), 25.0)
         cell.score = min(max(0.0, cell.score + (squared - _FREE) * window), _MOST_SCORE)
         if cell.score == 0.0:
@@ -189,9 +218,6 @@ def judge_in_the_dark(p: CellHealthParameters, memory: CellHealthMemory, window:
             continue
         if cell.first_step < 0:
             cell.first_step = step
-            forget_sums(cell)
-        add_look(p, cell, output, 0.0)
+            _begin_sums(memory, i)
         if cell.score > p.threshold:
-            _leave_out(cell, EVIDENCE_DARK, cell.score, p.threshold, cell.first_step)
-            cell.onset = 0.0
-            cell.kind = kind_of(cell, signal_of(cell))
+            _leave_out(p, memory, i, EVIDENCE_DARK, cell.score, p.threshold, cell.first_step)

@@ -11,6 +11,7 @@ from css_common.vectors import Vec3, matmul, multiply, scale
 from css_estimation.health.cell_evidence import (
     SHOWS,
     by_others,
+    forget_scores,
     leave_out,
     leave_out_scored,
     score_cells,
@@ -158,7 +159,7 @@ def looked(
         beyond = score_cells(p, memory, track, window, step, share, seen.support > 0 and not fades)
         # a direction that has been right for long is
         if beyond > 0 and track.calm >= _CALM_ENOUGH:
-            leave_out_scored(p, memory, step, window)
+            leave_out_scored(p, memory, step)
     wrong = seen.against > 0 and seen.against >= seen.support and not fades
     phase, since = track.phase, track.since + window
     if not settled and since > _SETTLED_AFTER and trace(covariance) < _SETTLED and not wrong:
@@ -230,14 +231,12 @@ def _searching(
     """A look of the search beside a direction that is followed."""
     best, sun_b = _weighed(p, memory, track, rate_sure)
     for i in range(memory.cells.shape[0]):
-        cell = memory.cells[i]
-        if cell.isolated == 0 and memory.against[i] > _GUILTY:
-            leave_out(cell, memory.against[i], _GUILTY, step, window)
-        elif by_others(cell) and memory.against[i] < -_GUILTY:
-            trust_again(cell)
+        if memory.verdicts[i].held == 0 and memory.against[i] > _GUILTY:
+            leave_out(p, memory, i, memory.against[i], _GUILTY, step)
+        elif by_others(memory, i) and memory.against[i] < -_GUILTY:
+            trust_again(memory, i)
     if best - likelihood_near(memory, track.frame, track.sun_b) > _ELSEWHERE:
-        for i in range(memory.cells.shape[0]):
-            memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
+        forget_scores(memory)
         return _found(track, sun_b, PHASE_FOLLOWING)
     return Track(
         track.phase,

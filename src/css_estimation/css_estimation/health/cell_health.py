@@ -88,7 +88,7 @@ def watch_cells(
         turn_b, window = _ZERO, 0.0
     for i in range(voltages.shape[0]):
         v = voltages[i]
-        left_out = memory.cells[i].isolated == 1 or (is_reading(v) and not in_range(p, v))
+        left_out = memory.verdicts[i].held == 1 or (is_reading(v) and not in_range(p, v))
         memory.trusted[i] = math.nan if left_out else v
     return CellHealthState(track, turn_b, window, step, isolated, least_change)
 
@@ -109,10 +109,10 @@ def _look(
         cell = memory.cells[i]
         mean = cell.sum / cell.readings if cell.readings > 0 else math.nan
         cell.sum, cell.readings = 0.0, 0
-        used = in_use(cell)
+        used = in_use(memory, i)
         memory.means[i] = mean
         memory.used[i] = mean if used else math.nan
-        memory.judged[i] = mean if used or by_others(cell) else math.nan
+        memory.judged[i] = mean if used or by_others(memory, i) else math.nan
         # a NaN compares false
         if used and mean > top:
             top = mean
@@ -121,5 +121,5 @@ def _look(
         judge_in_the_dark(p, memory, window, step)
     elif top > p.minimum and not (sky.known and sky.illumination < 1.0):
         track = looked(p, memory, track, window, rate_sure, step)
-    judge_signals(p, memory, track, step)
+    judge_signals(p, memory, step)
     return track

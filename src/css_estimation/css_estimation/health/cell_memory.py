@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.health import SORT_CELL, new_verdicts
 from css_common.vectors import Mat3, Vec3
 from css_estimation.symmetric import Symmetric
 
@@ -27,24 +28,37 @@ WATCHED = np.dtype(
         ("out_of_range", np.float64),  # recent cycles
         ("score", np.float64),  # contradiction by the other cells
         ("first_step", np.int64),  # when that began; -1: there is none
-        ("isolated", np.int64),  # 1: left out
-        ("kind", np.int64),
-        ("evidence", np.int64),
-        ("statistic", np.float64),
-        ("threshold", np.float64),
-        ("since_step", np.int64),  # first evidence
         ("good", np.float64),  # [s] of agreement since it was left out
         ("times", np.int64),  # that it was left out
-        ("weight", np.float64),  # of the sums that tell kinds apart, all over what it read while it failed
-        ("read", np.float64),  # sum of its outputs
+        # what tells kinds apart: all over the cycles since the first evidence
+        ("predicted", np.float64),  # by the others at the last look; NaN: they do not know
+        ("cycles", np.float64),
+        ("seconds", np.float64),
+        ("read", np.float64),  # sum of outputs
         ("read2", np.float64),  # of their squares
-        ("expected", np.float64),  # of what the others predict
+        ("zeros", np.float64),  # cycles in which it was dark
+        ("least", np.float64),
+        ("most", np.float64),
+        ("tops", np.float64),  # cycles in which it read the most
+        ("night", np.float64),  # cycles in which no Sun was predicted on it
+        ("night_read", np.float64),  # sum of outputs in them
+        ("compared", np.float64),  # cycles in which some was, and sums over them
+        ("dark_seen", np.float64),  # cycles in which it was dark and should have been lit
+        ("lit_seen", np.float64),  # in which it was lit and should have been
+        ("agreed", np.float64),  # those of them in which it read what was predicted
+        ("leaps", np.float64),  # cycles in which it leapt
+        ("sun_read2", np.float64),  # of squares of outputs
+        ("expected", np.float64),  # of predictions
         ("expected2", np.float64),
         ("cross", np.float64),  # of output times prediction
-        ("largest", np.float64),
-        ("zeros", np.float64),  # looks at which it was dark
-        ("tops", np.float64),  # at which it was at or above the top of its range
-        ("onset", np.float64),  # [s] from first evidence to isolation
+        ("sun_off", np.float64),  # of output less prediction
+        ("sun_off2", np.float64),
+        ("told", np.float64),  # cycles with any prediction, and sums over them
+        ("off", np.float64),  # of output less prediction
+        ("off2", np.float64),
+        ("off_time", np.float64),  # of that times time
+        ("time", np.float64),
+        ("time2", np.float64),
     ],
     align=True,
 )
@@ -55,6 +69,7 @@ class CellHealthMemory(NamedTuple):
     """Of N cells; all written by `cell_health.watch_cells`."""
 
     cells: np.ndarray  # (N,) of WATCHED
+    verdicts: np.ndarray  # (N,) of css_common.health.VERDICT
     grid: np.ndarray  # (hypotheses, DIRECTIONS) logarithms of weights, see `cell_search`
     misfits: np.ndarray  # (N,) room
     against: np.ndarray  # (N,) evidence that a cell fails, as the search has it
@@ -62,6 +77,8 @@ class CellHealthMemory(NamedTuple):
     means: np.ndarray  # (N,) outputs since the last look
     used: np.ndarray  # (N,) those of them that the direction rests on, NaN for others
     judged: np.ndarray  # (N,) those that rival directions are held against: also of cells left out for the direction's sake
+    swaps: np.ndarray  # (N, N) sum of |output of i less what is predicted of j| while i is left out
+    swap_looks: np.ndarray  # (N,) looks in it
     trusted: np.ndarray  # (N,) outputs of this cycle, NaN for those that are left out
 
 
@@ -91,6 +108,9 @@ class CellHealthState(NamedTuple):
     least_change: float  # [-] smallest change of any output from cycle to cycle: a step of the converter, or less
 
 
+NO_SIGNAL, OUT_OF_RANGE, LEAPING, STUCK = 0, 1, 2, 3
+"""What a cell shows by itself."""
+
 PHASE_LOOKING, PHASE_FOLLOWING, PHASE_SETTLED = 0, 1, 2
 
 
@@ -99,4 +119,18 @@ def new_memory(cells: int) -> CellHealthMemory:
     watched = np.zeros(cells, WATCHED)
     watched["first_step"] = -1
     hypotheses = 1 + cells + (cells * (cells - 1) // 2 if cells <= MOST_IN_PAIRS else 0)
-    return CellHealthMemory(watched, np.zeros((hypotheses, DIRECTIONS)), *(np.zeros(cells) for _ in range(7)))
+    misfits, against, healthy, means, used, judged, swap_looks, trusted = (np.zeros(cells) for _ in range(8))
+    return CellHealthMemory(
+        watched,
+        new_verdicts(SORT_CELL, cells),
+        np.zeros((hypotheses, DIRECTIONS)),
+        misfits,
+        against,
+        healthy,
+        means,
+        used,
+        judged,
+        np.zeros((cells, cells)),
+        swap_looks,
+        trusted,
+    )

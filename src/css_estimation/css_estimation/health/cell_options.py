@@ -4,6 +4,8 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from css_common.conversions import square
 from css_common.declared import builder, computed, given, made, table_of
 from css_common.schema import Values, flag, integers, real
@@ -25,7 +27,10 @@ _SCREENED = integers(
 
 
 def _screened(values: Values) -> int:
-    return sum(1 << int(i) for i in set(values[_SCREENED]))
+    mask = 0
+    for i in np.asarray(values[_SCREENED]).tolist():
+        mask |= 1 << i
+    return mask
 
 
 class CellHealthParameters(NamedTuple):

@@ -9,7 +9,8 @@ output again and again: as unlikely as others that are lit change.
 import math
 
 from css_common.kernel import kernel
-from css_estimation.health.cell_memory import CellHealthMemory
+from css_estimation.health.cell_kinds import add_output
+from css_estimation.health.cell_memory import LEAPING, NO_SIGNAL, OUT_OF_RANGE, STUCK, CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.cell_layout import READABLE
 
@@ -25,8 +26,6 @@ _LIT = 0.1  # output above which a cell tells how others change
 _FULL = 0.9  # above it the largest output that any cell has had may be the converter's
 _DARK = 0.05  # below which nothing need change
 _STEPS = 3.0  # of a converter that the ripple of others has to exceed before an output has to change
-
-NO_SIGNAL, OUT_OF_RANGE, LEAPING, STUCK = 0, 1, 2, 3
 
 
 @kernel
@@ -98,6 +97,7 @@ def note_outputs(
                 largest = max(v, cell.last, cell.before)
                 if second > max(_LEAP * p.noise, _LEAP_SHARE * largest) + 3.0 * turn * turn:
                     cell.jumps += 1.0
+                    cell.leaps += 1.0
                 cell.ripple = 0.95 * cell.ripple + 0.05 * min(second, _LEAP_SHARE * largest)
             if v != cell.last:
                 cell.same = 0.0
@@ -105,6 +105,8 @@ def note_outputs(
                 cell.same += _surprise(memory, voltages, i, least_change)
             cell.sum += v
             cell.readings += 1
+            if memory.verdicts[i].held == 1 or cell.first_step >= 0:
+                add_output(cell, v, dt)
     for i in range(voltages.shape[0]):
         cell = memory.cells[i]
         cell.before, cell.last = cell.last, voltages[i]
