@@ -77,6 +77,7 @@ def _leave_out(
     cell = memory.cells[i]
     cell.good = 0.0
     cell.times = min(cell.times + 1, _MOST_TIMES)
+    memory.changes[0] += 1
     hold(memory.verdicts[i], kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
 
 
@@ -92,6 +93,7 @@ def _begin_sums(memory: CellHealthMemory, i: int) -> None:
 def trust_again(memory: CellHealthMemory, i: int) -> None:
     """Uses a cell as if nothing had been."""
     release(memory.verdicts[i])
+    memory.changes[0] += 1
     cell = memory.cells[i]
     cell.score, cell.first_step, cell.same = 0.0, -1, 0.0
 
@@ -152,7 +154,10 @@ def _judge_on(
         # where nothing is known of the other, nothing can be compared
         memory.swaps[i, j] += abs(output - predicted) if not math.isnan(predicted) else 0.0
     signal = signal_of(cell)
-    rename(memory.verdicts[i], KIND_SWAPPED if is_swapped(memory, i) else kind_of(p, cell, signal))
+    kind = KIND_SWAPPED if is_swapped(memory, i) else kind_of(p, cell, signal)
+    if kind != memory.verdicts[i].kind:
+        rename(memory.verdicts[i], kind)
+        memory.changes[0] += 1
     if signal != NO_SIGNAL or off > _AGREES:
         cell.good = 0.0
     elif e.sight == SEEN and max(output, e.high) > SHOWS:

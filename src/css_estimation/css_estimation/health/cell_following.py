@@ -233,7 +233,7 @@ def _searching(
     for i in range(memory.cells.shape[0]):
         if memory.verdicts[i].held == 0 and memory.against[i] > _GUILTY:
             leave_out(p, memory, i, memory.against[i], _GUILTY, step)
-        elif by_others(memory, i) and memory.against[i] < -_GUILTY:
+        elif by_others(memory, i) and memory.against[i] < -_GUILTY and track.calm < _CALM_ENOUGH:
             trust_again(memory, i)
     if best - likelihood_near(memory, track.frame, track.sun_b) > _ELSEWHERE:
         forget_scores(memory)

@@ -70,6 +70,7 @@ class CellHealthMemory(NamedTuple):
 
     cells: np.ndarray  # (N,) of WATCHED
     verdicts: np.ndarray  # (N,) of css_common.health.VERDICT
+    changes: np.ndarray  # (1,) of verdicts so far
     grid: np.ndarray  # (hypotheses, DIRECTIONS) logarithms of weights, see `cell_search`
     misfits: np.ndarray  # (N,) room
     against: np.ndarray  # (N,) evidence that a cell fails, as the search has it
@@ -123,6 +124,7 @@ def new_memory(cells: int) -> CellHealthMemory:
     return CellHealthMemory(
         watched,
         new_verdicts(SORT_CELL, cells),
+        np.zeros(1, np.int64),
         np.zeros((hypotheses, DIRECTIONS)),
         misfits,
         against,

@@ -8,7 +8,10 @@ out is one whose output is missing.
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from css_common.declared import builder
+from css_common.health import SORT_CELL, new_verdicts
 from css_common.schema import Values
 from css_common.vectors import Vec3
 from css_estimation.health import cell_health, cell_memory, cell_options
@@ -20,6 +23,7 @@ from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, SunHeading
 from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS)
+NO_VERDICTS = new_verdicts(SORT_CELL, 0)
 _cell_parameters = builder(CellHealthParameters)
 
 
@@ -66,6 +70,16 @@ def initial_memory(algorithm: Any, p: Any) -> Any:
     if not isinstance(p, Watched):
         return algorithm.initial_memory(p)
     return WatchedMemory(cell_memory.new_memory(len(p.cells.layout.cells)), algorithm.initial_memory(p.own))
+
+
+def verdicts_of(memory: Any) -> np.ndarray:
+    """Rows of `css_common.health.VERDICT` of a memory of `initial_memory`."""
+    return memory.cells.verdicts if isinstance(memory, WatchedMemory) else NO_VERDICTS
+
+
+def verdict_changes(memory: Any) -> int:
+    """How often verdicts have changed so far."""
+    return int(memory.cells.changes[0]) if isinstance(memory, WatchedMemory) else 0
 
 
 def watched_heading(p, state, memory, dt, voltages, aiding):
