@@ -75,7 +75,7 @@ def _leave_out(
     since_step: int,
 ) -> None:
     cell = memory.cells[i]
-    cell.good = 0.0
+    cell.good, cell.sure = 0.0, 0
     cell.times = min(cell.times + 1, _MOST_TIMES)
     memory.changes[0] += 1
     hold(memory.verdicts[i], kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
@@ -107,7 +107,13 @@ def forget_scores(memory: CellHealthMemory) -> None:
 
 @kernel
 def score_cells(
-    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, step: int, share: float, dark_tells: bool
+    p: CellHealthParameters,
+    memory: CellHealthMemory,
+    track: Track,
+    window: float,
+    step: int,
+    share: float,
+    dark_tells: bool,
 ) -> int:
     """Adds a look to what speaks against each cell, and for those left out; how many are beyond the threshold.
 
@@ -184,6 +190,7 @@ def leave_out_scored(p: CellHealthParameters, memory: CellHealthMemory, step: in
         score = memory.cells[i].score
         if memory.verdicts[i].held == 0 and score > p.threshold:
             leave_out(p, memory, i, score, p.threshold, step)
+            memory.cells[i].sure = 1
 
 
 @kernel

@@ -27,7 +27,15 @@ from css_estimation.health.cell_memory import (
     Track,
 )
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.health.cell_search import begin_search, cost, judge_hypotheses, likelihood_far, likelihood_near, refine, weigh
+from css_estimation.health.cell_search import (
+    begin_search,
+    cost,
+    judge_hypotheses,
+    likelihood_far,
+    likelihood_near,
+    refine,
+    weigh,
+)
 from css_estimation.sun.direction_grid import direction
 from css_estimation.sun.sunline_filter import propagate
 from css_estimation.symmetric import isotropic, trace
@@ -196,27 +204,21 @@ def _weighed(p: CellHealthParameters, memory: CellHealthMemory, track: Track, ra
 
 
 @kernel
-def _looking(
-    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool
-) -> Track:
+def _looking(p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool) -> Track:
     """A look without a direction to follow."""
     frame, since, searched = track.frame, track.since, track.searched
     if since == 0.0:
         begin_search(memory, track.sun_b, 1.0, 0.0)
         frame, searched = IDENTITY, _SEARCH_EVERY + window
     since += window
-    track = Track(
-        track.phase, since, 0.0, 0.0, _DOUBT, searched, track.sun_b, track.covariance, track.light, frame
-    )
+    track = Track(track.phase, since, 0.0, 0.0, _DOUBT, searched, track.sun_b, track.covariance, track.light, frame)
     if searched <= _SEARCH_EVERY:
         return track
     best, sun_b = _weighed(p, memory, track, rate_sure)
     elsewhere = likelihood_far(memory, track.frame, sun_b)
     if since >= _FIRST_SEARCH and (best - elsewhere > _CLEAR or since > _LONGEST_SEARCH):
         return _found(track, sun_b, PHASE_FOLLOWING)
-    return Track(
-        track.phase, since, 0.0, 0.0, _DOUBT, 0.0, track.sun_b, track.covariance, track.light, frame
-    )
+    return Track(track.phase, since, 0.0, 0.0, _DOUBT, 0.0, track.sun_b, track.covariance, track.light, frame)
 
 
 @kernel
@@ -233,7 +235,7 @@ def _searching(
     for i in range(memory.cells.shape[0]):
         if memory.verdicts[i].held == 0 and memory.against[i] > _GUILTY:
             leave_out(p, memory, i, memory.against[i], _GUILTY, step)
-        elif by_others(memory, i) and memory.against[i] < -_GUILTY and track.calm < _CALM_ENOUGH:
+        elif by_others(memory, i) and memory.against[i] < -_GUILTY:
             trust_again(memory, i)
     if best - likelihood_near(memory, track.frame, track.sun_b) > _ELSEWHERE:
         forget_scores(memory)

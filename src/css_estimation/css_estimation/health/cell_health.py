@@ -17,6 +17,7 @@ from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
 from css_common.vectors import Vec3, add, norm, scale
 from css_estimation.health.cell_evidence import (
+    SHOWS,
     by_others,
     in_use,
     isolated_mask,
@@ -32,12 +33,13 @@ from css_estimation.health.cell_memory import (
     Track,
 )
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.health.cell_signals import in_range, is_reading, note_outputs
+from css_estimation.health.cell_signals import in_range, note_outputs
 from css_estimation.health.sight import Sight
 from css_estimation.sun.sun_heading import RATE_GYRO, RATE_MOMENTUM, RATE_NONE, Sky
 from css_estimation.symmetric import isotropic, trace
 
 _LOOK = 0.499  # [s]
+_NIGHT = 60.0  # [s] after which the Sun has set however late a model of the orbit is
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
 
@@ -52,7 +54,7 @@ def initial_state() -> CellHealthState:
     """Nothing seen yet."""
     covariance = isotropic.py_func(1.0)
     track = Track(PHASE_LOOKING, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), covariance, 1.0, IDENTITY)
-    return CellHealthState(track, _ZERO, 0.0, 0, 0, math.inf)
+    return CellHealthState(track, _ZERO, 0.0, 0.0, 0, 0, math.inf)
 
 
 @kernel
@@ -82,15 +84,18 @@ def watch_cells(
     turn_b = add(state.turn_b, scale(dt, omega_bn_b)) if rate_known else state.turn_b
     window, step = state.window + dt, state.step + 1
     track, isolated = state.track, state.isolated
+    night = state.night + dt if sky.known and sky.illumination <= 0.0 else 0.0
     if window > _LOOK or step == 1:
-        track = _look(p, memory, carried(track, turn_b, window, rate_sure), window, rate_sure, step, sky)
+        track = _look(
+            p, memory, carried(track, turn_b, window, rate_sure), window, rate_sure, step, sky, night > _NIGHT
+        )
         isolated = isolated_mask(memory)
         turn_b, window = _ZERO, 0.0
     for i in range(voltages.shape[0]):
         v = voltages[i]
-        left_out = memory.verdicts[i].held == 1 or (is_reading(v) and not in_range(p, v))
+        left_out = memory.verdicts[i].held == 1 or not in_range(p, v)
         memory.trusted[i] = math.nan if left_out else v
-    return CellHealthState(track, turn_b, window, step, isolated, least_change)
+    return CellHealthState(track, turn_b, window, night, step, isolated, least_change)
 
 
 @kernel
@@ -102,9 +107,10 @@ def _look(
     rate_sure: bool,
     step: int,
     sky: Sky,
+    night: bool,
 ) -> Track:
     """Judges all cells by what they read since the last look."""
-    top = 0.0
+    top, bright = 0.0, 0
     for i in range(memory.cells.shape[0]):
         cell = memory.cells[i]
         mean = cell.sum / cell.readings if cell.readings > 0 else math.nan
@@ -116,10 +122,12 @@ def _look(
         # a NaN compares false
         if used and mean > top:
             top = mean
-    night = sky.known and sky.illumination <= 0.0
-    if night:
+        if used and mean > SHOWS:
+            bright += 1
+    # one cell that is bright in the shadow fails; of several, the model of the orbit does
+    if night and bright < 2:
         judge_in_the_dark(p, memory, window, step)
-    elif top > p.minimum and not (sky.known and sky.illumination < 1.0):
+    elif top > p.minimum and (bright > 1 or not (sky.known and sky.illumination < 1.0)):
         track = looked(p, memory, track, window, rate_sure, step)
     judge_signals(p, memory, step)
     return track

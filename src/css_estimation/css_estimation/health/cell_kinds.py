@@ -153,7 +153,14 @@ def _by_least_squares(cell) -> int:
     tilt = cell.off_time - cell.off * cell.time / n
     slope = tilt / max(spread, 1e-9)
     growing = max(constant - slope * tilt, 0.0)
-    if abs(slope) * cell.seconds > max(_GROWN, 0.5 * abs(cell.off) / n) and growing < 0.2 * constant:
+    # in the Sun: squares that are left by v = k e
+    scaled = cell.sun_read2 - cell.cross * cell.cross / max(cell.expected2, 1e-9)
+    grown = abs(slope) * cell.seconds > max(_GROWN, 0.5 * abs(cell.off) / n)
+    if (
+        grown
+        and growing < 0.2 * constant
+        and growing < scaled + cell.night_read * cell.night_read / max(cell.night, 1.0)
+    ):
         return KIND_DRIFTING
     # what is read without the Sun is no share of anything; the Earth gives less
     if cell.night > _FEW_CYCLES and abs(cell.night_read) > _MORE_THAN_EARTH * cell.night:
@@ -161,8 +168,6 @@ def _by_least_squares(cell) -> int:
     m = cell.compared
     if m < 2.0:
         return KIND_BIAS
-    # in the Sun: by v = k e and by v = e + b; with predictions that stay the same both are as good, and light is more
-    # easily lost than won
-    scaled = cell.sun_read2 - cell.cross * cell.cross / max(cell.expected2, 1e-9)
+    # with predictions that stay the same both are as good, and light is more easily lost than won
     biased = max(cell.sun_off2 - cell.sun_off * cell.sun_off / m, 0.0)
     return KIND_BIAS if biased < 0.3 * scaled else KIND_SCALED

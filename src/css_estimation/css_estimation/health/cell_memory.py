@@ -28,6 +28,7 @@ WATCHED = np.dtype(
         ("out_of_range", np.float64),  # recent cycles
         ("score", np.float64),  # contradiction by the other cells
         ("first_step", np.int64),  # when that began; -1: there is none
+        ("sure", np.int64),  # 1: left out while the direction had been sure for long
         ("good", np.float64),  # [s] of agreement since it was left out
         ("times", np.int64),  # that it was left out
         # what tells kinds apart: all over the cycles since the first evidence
@@ -77,7 +78,9 @@ class CellHealthMemory(NamedTuple):
     healthy: np.ndarray  # (N,) room
     means: np.ndarray  # (N,) outputs since the last look
     used: np.ndarray  # (N,) those of them that the direction rests on, NaN for others
-    judged: np.ndarray  # (N,) those that rival directions are held against: also of cells left out for the direction's sake
+    judged: (
+        np.ndarray
+    )  # (N,) those that rival directions are held against: also of cells left out for the direction's sake
     swaps: np.ndarray  # (N, N) sum of |output of i less what is predicted of j| while i is left out
     swap_looks: np.ndarray  # (N,) looks in it
     trusted: np.ndarray  # (N,) outputs of this cycle, NaN for those that are left out
@@ -104,6 +107,7 @@ class CellHealthState(NamedTuple):
     track: Track
     turn_b: Vec3  # [rad] since the last look
     window: float  # [s] since the last look
+    night: float  # [s] for which the model of the orbit has had no Sun
     step: int  # number of this cycle
     isolated: int  # mask
     least_change: float  # [-] smallest change of any output from cycle to cycle: a step of the converter, or less

@@ -20,7 +20,9 @@ from css_estimation.sun.sunline_filter import constrain, update_cell
 from css_estimation.symmetric import Symmetric, isotropic
 
 _HALF_WAY = 0.08  # [rad] from one direction to the next
-_FAILED = 6.0  # squared sigmas that a failed cell costs
+# Squared sigmas that a cell costs at every look which is said to fail, as its reading then tells nothing. One that has
+# been left out while the direction was sure costs less.
+_FAILED, _SURELY_FAILED = 6.0, 2.0
 _DEAD = 0.05
 _BRIGHT = 0.45  # of the light: a cell above it sees the Sun if it may
 _EARTH_ERROR = 0.1  # of an output, 1 sigma
@@ -81,6 +83,13 @@ def begin_search(memory: CellHealthMemory, sun_b: Vec3, variance: float, worth: 
 
 
 @kernel
+def _odds(memory: CellHealthMemory, i: int) -> float:
+    """What it costs to say that a cell fails."""
+    sure = memory.verdicts[i].held == 1 and memory.cells[i].sure == 1
+    return -0.5 * (_SURELY_FAILED if sure else _FAILED)
+
+
+@kernel
 def weigh(p: CellHealthParameters, memory: CellHealthMemory, outputs, frame: Mat3, light: float, kept: float) -> None:
     """Adds a look to the weights of all hypotheses and directions, of which a share of the old is `kept`."""
     count = outputs.shape[0]
@@ -97,12 +106,13 @@ def weigh(p: CellHealthParameters, memory: CellHealthMemory, outputs, frame: Mat
         grid[0, g] = kept * grid[0, g] - 0.5 * total
         h = 1
         for i in range(count):
-            grid[h, g] = kept * grid[h, g] - 0.5 * (total - off[i] + _FAILED)
+            grid[h, g] = kept * grid[h, g] - 0.5 * (total - off[i]) + _odds(memory, i)
             h += 1
         if count <= MOST_IN_PAIRS:
             for i in range(count):
                 for j in range(i):
-                    grid[h, g] = kept * grid[h, g] - 0.5 * (total - off[i] - off[j] + 2.0 * _FAILED)
+                    both = _odds(memory, i) + _odds(memory, j)
+                    grid[h, g] = kept * grid[h, g] - 0.5 * (total - off[i] - off[j]) + both
                     h += 1
 
 

@@ -29,10 +29,9 @@ _STEPS = 3.0  # of a converter that the ripple of others has to exceed before an
 
 
 @kernel
-def is_reading(v: float) -> bool:
-    """Whether an output is one of a cell."""
-    # a NaN compares false
-    return abs(v) < READABLE
+def reading(v: float) -> float:
+    """An output as it is looked at: no more than a cell can read, also of one at the limit of its converter; or NaN."""
+    return min(max(v, -READABLE), READABLE) if abs(v) < math.inf else math.nan
 
 
 @kernel
@@ -76,24 +75,23 @@ def note_outputs(
     turn = max(rate, _FASTEST) * dt
     top = 0.0
     for i in range(voltages.shape[0]):
-        cell, v = memory.cells[i], voltages[i]
+        cell, v = memory.cells[i], reading(voltages[i])
         # a NaN compares false
         if v > cell.top and in_range(p, v):
             cell.top = v
         top = max(top, cell.top)
-        if is_reading(v) and is_reading(cell.last):
-            change = abs(v - cell.last)
-            if change > 0.0:
-                least_change = min(least_change, change)
+        change = abs(v - cell.last)
+        if change > 0.0:
+            least_change = min(least_change, change)
     for i in range(voltages.shape[0]):
-        cell, v = memory.cells[i], voltages[i]
+        cell, v = memory.cells[i], reading(voltages[i])
         cell.out_of_range *= _KEPT
         cell.jumps *= _KEPT
-        if is_reading(v):
+        if not math.isnan(v):
             if not in_range(p, v):
                 cell.out_of_range += 1.0
-            if is_reading(cell.last) and is_reading(cell.before):
-                second = abs(v - 2.0 * cell.last + cell.before)
+            second = abs(v - 2.0 * cell.last + cell.before)
+            if not math.isnan(second):
                 largest = max(v, cell.last, cell.before)
                 if second > max(_LEAP * p.noise, _LEAP_SHARE * largest) + 3.0 * turn * turn:
                     cell.jumps += 1.0
@@ -109,7 +107,7 @@ def note_outputs(
                 add_output(cell, v, dt)
     for i in range(voltages.shape[0]):
         cell = memory.cells[i]
-        cell.before, cell.last = cell.last, voltages[i]
+        cell.before, cell.last = cell.last, reading(voltages[i])
     return least_change
 
 
@@ -119,7 +117,7 @@ def _surprise(memory: CellHealthMemory, voltages, i: int, least_change: float) -
     lit = changed = 0
     for j in range(voltages.shape[0]):
         other = memory.cells[j]
-        if j == i or not is_reading(voltages[j]) or not voltages[j] > _LIT:
+        if j == i or not _LIT < voltages[j] <= READABLE:
             continue
         lit += 1
         ripple = other.ripple * min(1.0, voltages[i] / voltages[j])
