@@ -6,12 +6,14 @@
 out is one whose output is missing.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from css_common.declared import builder
 from css_common.health import SORT_CELL, new_verdicts
+from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3
 from css_estimation.health import cell_health, cell_memory, cell_options
@@ -19,7 +21,7 @@ from css_estimation.health.cell_health import watch_cells
 from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun import heading_dispatch
-from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, SunHeading
+from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS)
@@ -82,12 +84,12 @@ def verdict_changes(memory: Any) -> int:
     return int(memory.cells.changes[0]) if isinstance(memory, WatchedMemory) else 0
 
 
-def watched_heading(p, state, memory, dt, voltages, aiding):
-    """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
+@kernel
+def _watch_sensors(p, state, memory, dt: float, voltages, aiding: Aiding) -> CellHealthState:
     gyro_speaks = p.use_gyro and aiding.gyro_valid
     source = RATE_GYRO if gyro_speaks else state.rate_source
     omega_bn_b = aiding.gyro_b if gyro_speaks else state.omega_bn_b
-    cells = watch_cells(
+    return watch_cells(
         p.cells,
         state.cells,
         memory.cells,
@@ -97,8 +99,11 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         source,
         aiding.sky,
     )
-    own, said = heading_dispatch.estimate_heading(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
-    heading = SunHeading(
+
+
+@kernel
+def _with_health(said: SunHeading, cells: CellHealthState) -> SunHeading:
+    return SunHeading(
         said.sun_b,
         said.covariance,
         said.omega_bn_b,
@@ -113,4 +118,23 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         cells.isolated,
         0,
     )
-    return WatchedState(cells, said.omega_bn_b, said.rate_source, own), heading
+
+
+def watched_heading(p: Any, state: Any, memory: Any, dt: Any, voltages: Any, aiding: Any) -> Any:
+    """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
+    cells = _watch_sensors(p, state, memory, dt, voltages, aiding)
+    own, said = heading_dispatch.estimate_heading(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
+    return WatchedState(cells, said.omega_bn_b, said.rate_source, own), _with_health(said, cells)
+
+
+def stepped_by(step: Callable[..., Any]) -> Callable[..., Any]:
+    """What does the same with the `step` of an algorithm whose parameters are of the type of another's."""
+
+    def heading(p: Any, state: Any, memory: Any, dt: float, voltages: np.ndarray, aiding: Aiding) -> Any:
+        if not isinstance(p, Watched):
+            return step(p, state, memory, dt, voltages, aiding)
+        cells = _watch_sensors(p, state, memory, dt, voltages, aiding)
+        own, said = step(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
+        return WatchedState(cells, said.omega_bn_b, said.rate_source, own), _with_health(said, cells)
+
+    return heading

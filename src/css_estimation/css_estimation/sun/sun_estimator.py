@@ -18,6 +18,7 @@ from css_estimation.health import watched
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
 from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
+from css_estimation.sun.heading_dispatch import home_of
 from css_estimation.sun.heading_loop import cycle_of
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
@@ -140,7 +141,13 @@ class SunEstimator(Component):
         self._parameters = watched.watched_parameters(self.algorithm, self.values)
         self._state = watched.initial_state(self.algorithm, self._parameters)
         self._memory = watched.initial_memory(self.algorithm, self._parameters)
-        self._step = typed_call(cycle_of(self.algorithm.step.__module__))
+        own = self._parameters.own if isinstance(self._parameters, watched.Watched) else self._parameters
+        # the loop finds `step` by the type of the parameters, which may be those of another module
+        self._is_found = getattr(home_of(own), "step", None) is self.algorithm.step
+        if self._is_found:
+            self._step = typed_call(cycle_of(self.algorithm.step.__module__))
+        else:
+            self._step = watched.stepped_by(self.algorithm.step)
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
         self._sky = flight_sky(self.values)
@@ -157,7 +164,7 @@ class SunEstimator(Component):
         from css_estimation.sun.sky_table import sky_table
 
         measured = measured_in(steps)
-        if measured is None or not self._silent_so_far(int(steps.stamps_ns[0])):
+        if measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
             return None
         stamps = steps.stamps_ns
         before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns
