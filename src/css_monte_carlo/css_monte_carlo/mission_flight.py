@@ -200,14 +200,14 @@ class MissionFlight:
             work=aligned_table(len(keys), len(new_workspace())),
             history=np.stack([latency.new_history(max(map(latency.longest_lag, self._latencies())))] * len(keys)),
         )
-        control = None
-        if self._control is not None:
-            control = _algorithm(self._control).initial_state(_parameters(self._control, self._control.values))
         states = []
         for key, rotation in zip(keys, rotations, strict=True):
             attitude, memory = self._initial_attitude(key, rotation.sigma_bn, guess_deg)
             heading, heading_memory = self._initial_heading()
-            states.append(CaseState(rotation, heading, heading_memory, attitude, memory, control, _NOWHERE, -1))
+            control, of_control = self._initial_control()
+            states.append(
+                CaseState(rotation, heading, heading_memory, attitude, memory, control, of_control, _NOWHERE, -1)
+            )
         return tables, states
 
     def _initial_heading(self) -> tuple[Any, Any]:
@@ -217,6 +217,13 @@ class MissionFlight:
         algorithm = _algorithm(self._heading)
         p = watched.watched_parameters(algorithm, self._heading.values)
         return watched.initial_state(algorithm, p), watched.initial_memory(algorithm, p)
+
+    def _initial_control(self) -> tuple[Any, Any]:
+        """State and memory of the control law."""
+        if self._control is None:
+            return None, None
+        algorithm, p = _algorithm(self._control), _parameters(self._control, self._control.values)
+        return algorithm.initial_state(p), algorithm.initial_memory(p)
 
     def _initial_attitude(self, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> tuple[Any, Any]:
         """State and memory of the attitude filter."""
