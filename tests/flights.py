@@ -24,6 +24,11 @@ def fly_composed(mission: Mission, bag: Path | None) -> FlightResult:
         return flight.fly()
 
 
+def stamped_topics(mission) -> list[str]:
+    """Topics of a mission that have a message for each stamp; on the others messages tell of events."""
+    return [topic for topic, output in mission.outputs.items() if not output.events]
+
+
 def messages_by_topic(bag: Path) -> dict[str, list[tuple[int, bytes]]]:
     """Stamps and bytes of every topic of a recording."""
     messages: dict[str, list[tuple[int, bytes]]] = defaultdict(list)

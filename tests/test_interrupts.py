@@ -4,7 +4,7 @@
 import os
 import signal
 
-from flights import messages_by_topic, short_mission
+from flights import messages_by_topic, short_mission, stamped_topics
 from presence import present
 
 from css_bringup.composed import ComposedFlight
@@ -30,8 +30,8 @@ def test_a_composed_flight_stops_where_it_is(tmp_path):
     assert not result.failure
     assert 50 < result.steps < mission.steps
     recorded = messages_by_topic(tmp_path / "bag")
-    assert {topic: len(recorded[f"/{topic}"]) for topic in mission.topics} == dict.fromkeys(
-        mission.topics, result.steps
+    assert {topic: len(recorded[f"/{topic}"]) for topic in stamped_topics(mission)} == dict.fromkeys(
+        stamped_topics(mission), result.steps
     )
 
 
@@ -55,7 +55,7 @@ def test_processes_end_with_their_flight(tmp_path):
     assert result.steps > 0
     assert result.messages_lost == 0, result.notes
     recorded = messages_by_topic(bag)
-    topics = result.mission.topics
+    topics = stamped_topics(result.mission)
     assert {topic: len(recorded[f"/{topic}"]) for topic in topics} == dict.fromkeys(topics, result.steps)
 
 

@@ -38,6 +38,8 @@ class Input:
         topic: relative topic name.
         message_type: ROS message class.
         required: without it there is no cycle; an optional input may be silent in real time (a dead gyro).
+        outlived: a mission must have it, but in real time the cycle runs without it once it has been silent for longer
+            than the deadline: a control that brings its actuators to rest.
         divider: a message is due every `divider` steps.
         lengths: expected length of array fields; another length is refused at the edge.
         used: fields that the component reads and that must be finite; empty: all. Drivers leave NaN in others.
@@ -53,6 +55,7 @@ class Input:
     topic: str
     message_type: type
     required: bool = True
+    outlived: bool = False
     divider: int = 1
     lengths: Mapping[str, int] = field(default_factory=dict)
     used: tuple[str, ...] = ()
@@ -60,6 +63,11 @@ class Input:
     readings: Mapping[str, Readings] = field(default_factory=dict)
     heeded: bool = True
     switch: str = ""
+
+    @property
+    def may_be_silent(self) -> bool:
+        """A cycle may run without it once a deadline is over."""
+        return self.outlived or not self.required
 
 
 @dataclass(frozen=True)

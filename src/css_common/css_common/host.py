@@ -228,7 +228,7 @@ class ComponentNode(LifecycleNode):
             receive = partial(self._receive, source.key, edge)
             with endpoint(source.topic):
                 self._subscribe(source.message_type, source.topic, receive, edge.begin_again)
-        if self.mission.values.lockstep.realtime_factor > 0.0 and any(not i.required for i in inputs):
+        if self.mission.values.lockstep.realtime_factor > 0.0 and any(i.may_be_silent for i in inputs):
             self._deadline_timer = self.create_timer(values.io.deadline, self._run_overdue, clock=self._steady)
 
     def check(self) -> None:

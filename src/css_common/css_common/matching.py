@@ -146,7 +146,7 @@ class Matcher:
         self._done = int(cycles.stamps_ns[-1])
 
     def overdue(self) -> list[tuple[int, dict[str, Sample | None]]]:
-        """Cycles that wait for optional inputs alone, oldest first; called at a deadline.
+        """Cycles that wait for inputs that may be silent alone, oldest first; called at a deadline.
 
         What is silent now is not waited for again until it speaks: a dead gyro costs one deadline, not one a cycle.
         """
@@ -154,7 +154,7 @@ class Matcher:
         for stamp in sorted(self._pending):
             slots = self._pending.get(stamp)
             missing = self._due(stamp) - slots.keys() if slots is not None else frozenset()
-            if slots is not None and not any(self.inputs[key].required for key in missing):
+            if slots is not None and all(self.inputs[key].may_be_silent for key in missing):
                 self._speaking -= missing
                 ready.append(self._complete(stamp))
         return ready
@@ -163,6 +163,12 @@ class Matcher:
         """Cycles that have all that is waited for since `retune`, oldest first."""
         ready = [stamp for stamp, slots in self._pending.items() if slots.keys() >= self._due(stamp)]
         return [self._complete(stamp) for stamp in sorted(ready) if stamp in self._pending]
+
+    def _paces_instead(self, stamp: int) -> bool:
+        """Whether another input has to pace the cycle, because the one that does has fallen silent and may."""
+        pacing = self._latest.get(self._pacing) if self._pacing is not None else None
+        silent = pacing is not None and stamp - pacing.stamp_ns > self.deadline_ns
+        return silent and self.inputs[str(self._pacing)].outlived and stamp > self._done
 
     def give_up(self) -> None:
         """Counts what still waits as unmatched: nothing more will come."""
@@ -224,9 +230,9 @@ class Matcher:
 
     def _offer_latest(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         self._latest[key] = sample
-        if key != self._pacing:
-            return []
         stamp = sample.stamp_ns
+        if key != self._pacing and not self._paces_instead(stamp):
+            return []
         if stamp <= self._done:  # as the edge found, the clock was set back
             self._begin_anew()
             self._latest[key] = sample
@@ -234,7 +240,7 @@ class Matcher:
         for name, entry in self.inputs.items():
             held = self._latest.get(name)
             fresh = held is not None and abs(stamp - held.stamp_ns) <= self.deadline_ns
-            if entry.required and not fresh:
+            if not fresh and not entry.may_be_silent:
                 self.unmatched += 1
                 _note(self._missed, entry.topic, stamp)
                 return []

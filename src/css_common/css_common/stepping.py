@@ -49,6 +49,7 @@ class Port(NamedTuple):
     topic: str
     codec: Codec
     real_fields: list
+    events: bool  # as of `Output`
 
 
 def _raise(error: Exception) -> None:
@@ -89,7 +90,7 @@ class Stepper:
         self.canonical = dict(canonical)
         self.component = component_type(name, shaped_values(component_type.table(), self.canonical))
         self.ports = {
-            output.key: Port(output.key, output.topic, codec, codec.real_fields())
+            output.key: Port(output.key, output.topic, codec, codec.real_fields(), output.events)
             for output in component_type.outputs(name, self.component.values)
             for codec in (codec_of(output.message_type),)
         }

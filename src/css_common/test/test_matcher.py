@@ -35,9 +35,9 @@ class Begun(Component):
         self.begun += 1
 
 
-def entry(key: str, *, required: bool = True, divider: int = 1) -> Input:
+def entry(key: str, *, required: bool = True, divider: int = 1, outlived: bool = False) -> Input:
     """An input called `key`."""
-    return Input(key, f"topic/{key}", CssVoltages, required=required, divider=divider)
+    return Input(key, f"topic/{key}", CssVoltages, required=required, divider=divider, outlived=outlived)
 
 
 def matcher_of(inputs: Iterable[Input], awaited: Iterable[str] | None = None, **changes) -> Matcher:
@@ -413,3 +413,30 @@ def test_a_whole_stretch_is_taken_at_once_and_one_with_a_gap_or_a_lag_is_not():
     ahead = matcher_of(AB)
     assert offered(ahead, ("a", 0)) == []
     assert taken_at_once(ahead, [("a", 1), ("b", 1)]) is None, "one waits already"
+
+
+def test_a_required_input_that_may_be_outlived_is_done_without_once_overdue():
+    matcher = matcher_of([entry("a", outlived=True), entry("b")])
+    assert offered(matcher, ("a", 0), ("b", 0), ("b", 1)) == [(0, "ab")]
+    assert overdue(matcher) == [(1, "b")]
+    assert offered(matcher, ("b", 2), ("b", 3)) == [(2, "b"), (3, "b")]
+    assert offered(matcher, ("a", 4), ("b", 4)) == [(4, "ab")]
+    assert overdue(matcher_waiting_for_both()) == []
+
+
+def matcher_waiting_for_both():
+    """A matcher of two inputs of which neither may be outlived, one of them missing."""
+    matcher = matcher_of([entry("a"), entry("b")])
+    matcher.offer("b", at(0))
+    return matcher
+
+
+def test_another_input_paces_latest_cycles_when_the_one_that_does_is_outlived():
+    matcher = matcher_of([entry("a", outlived=True), entry("b")], **LATEST)
+    assert offered(matcher, ("b", 0), ("a", 0.1)) == [(0.1, "ab")]
+    assert offered(matcher, ("b", 1), ("b", 5)) == []  # within the deadline of five steps
+    assert offered(matcher, ("b", 6), ("b", 7)) == [(6, "b"), (7, "b")]
+    assert offered(matcher, ("a", 7.5)) == [(7.5, "ab")]
+    assert offered(matcher, ("b", 8)) == []
+    matcher = matcher_of([entry("a"), entry("b")], **LATEST)
+    assert offered(matcher, ("b", 0), ("a", 0.1), ("b", 20)) == [(0.1, "ab")]

@@ -80,9 +80,11 @@ def test_topics(kind):
     voltages, gyro, *_ = kind.inputs("left", values)
     assert (voltages.topic, voltages.lengths, voltages.required) == ("css/voltages", {"voltages": 1}, True)
     assert (gyro.topic, gyro.required) == ("gyro/imu", False)
-    (output,) = kind.outputs("left", values)
+    output, health = kind.outputs("left", values)
     assert output.topic == "left/sun_estimate"
     assert output.ends_cycle
+    assert (health.topic, health.events) == ("health/left", True)
+    assert kind.outputs("left", values_of(kind, cells__normals=[0.0, 0.0, 1.0], health__enabled=False)) == (output,)
 
 
 @FIELD_KINDS

@@ -23,14 +23,14 @@ def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
     return _attitude_step(home_of(p))(p, state, memory, dt, voltages, aiding, around, k)
 
 
-def command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
+def command(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out):
     """State after one cycle of a control law; without control, torques and dipoles stay as they are.
 
     Args:
         heading: `SunHeading`.
-        p, speeds, field, torque_out, dipole_out: as in `sunpoint_control.control_algorithm`.
+        p, memory, speeds, field, torque_out, dipole_out: as in `sunpoint_control.control_algorithm`.
     """
-    return _control_step(home_of(p))(p, state, dt, heading, speeds, field, torque_out, dipole_out)
+    return _control_step(home_of(p))(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out)
 
 
 def tally(tallies, c, step, marks, truth, heading, attitude, memory):
@@ -75,19 +75,20 @@ def _attitude_step(home):
 
 
 @overload(command, jit_options={"forceinline": True})
-def _overload_command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
+def _overload_command(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out):
     return _control_step(home_of(p))
 
 
 def _control_step(home):
     if home is None:
-        return lambda p, state, dt, heading, speeds, field, torque_out, dipole_out: None
+        return lambda p, state, memory, dt, heading, speeds, field, torque_out, dipole_out: None
     step = home.step
 
-    def call(p, state, dt, heading, speeds, field, torque_out, dipole_out):
+    def call(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out):
         after, _ = step(
             p,
             state,
+            memory,
             dt,
             heading.sun_b,
             heading.validity,

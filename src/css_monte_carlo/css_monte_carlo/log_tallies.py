@@ -22,7 +22,19 @@ from css_monte_carlo.step_truth import Truth
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 _NO_HEADING = SunHeading(
-    _ZERO, sun_heading.NO_COVARIANCE, _ZERO, 0.0, 0.0, 0, 0, sun_heading.VALIDITY_NONE, sun_heading.RATE_NONE, 0, 0, 0, 0
+    _ZERO,
+    sun_heading.NO_COVARIANCE,
+    _ZERO,
+    0.0,
+    0.0,
+    0,
+    0,
+    sun_heading.VALIDITY_NONE,
+    sun_heading.RATE_NONE,
+    0,
+    0,
+    0,
+    0,
 )
 _NO_ATTITUDE = AttitudeSolution(_ZERO, _ZERO, _ZERO, 0.0, 0.0, 0, 0, attitude_solution.VALIDITY_NONE, 0, 0)
 

@@ -94,6 +94,7 @@ class CaseState(NamedTuple):
     attitude: Any
     memory: Any  # the same of the attitude filter
     control: Any
+    control_memory: Any  # arrays of the control law
     field_b: Vec3  # [T] last measurement of the field
     field_step: int  # when it was taken; -1: never
 
@@ -176,7 +177,9 @@ def fly_block(
             # as the control node has it: the last measurement, for as long as the next may be on its way
             field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
             held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
-            control_state = command(v.control, control_state, since_s, heading, speeds, held, torque, dipole)
+            control_state = command(
+                v.control, control_state, state.control_memory, since_s, heading, speeds, held, torque, dipole
+            )
             momentum_b = sum_along_axes(craft.body.wheels, momentum)
             truth = Truth(
                 rotation.sigma_bn,
@@ -203,6 +206,7 @@ def fly_block(
             attitude_state,
             state.memory,
             control_state,
+            state.control_memory,
             field_b,
             field_step,
         )

@@ -18,9 +18,9 @@ from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
+from css_estimation.health import watched
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
-from css_estimation.health import watched
 from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
@@ -200,14 +200,14 @@ class MissionFlight:
             work=aligned_table(len(keys), len(new_workspace())),
             history=np.stack([latency.new_history(max(map(latency.longest_lag, self._latencies())))] * len(keys)),
         )
-        control = None
-        if self._control is not None:
-            control = _algorithm(self._control).initial_state(_parameters(self._control, self._control.values))
         states = []
         for key, rotation in zip(keys, rotations, strict=True):
             attitude, memory = self._initial_attitude(key, rotation.sigma_bn, guess_deg)
             heading, heading_memory = self._initial_heading()
-            states.append(CaseState(rotation, heading, heading_memory, attitude, memory, control, _NOWHERE, -1))
+            control, of_control = self._initial_control()
+            states.append(
+                CaseState(rotation, heading, heading_memory, attitude, memory, control, of_control, _NOWHERE, -1)
+            )
         return tables, states
 
     def _initial_heading(self) -> tuple[Any, Any]:
@@ -217,6 +217,13 @@ class MissionFlight:
         algorithm = _algorithm(self._heading)
         p = watched.watched_parameters(algorithm, self._heading.values)
         return watched.initial_state(algorithm, p), watched.initial_memory(algorithm, p)
+
+    def _initial_control(self) -> tuple[Any, Any]:
+        """State and memory of the control law."""
+        if self._control is None:
+            return None, None
+        algorithm, p = _algorithm(self._control), _parameters(self._control, self._control.values)
+        return algorithm.initial_state(p), algorithm.initial_memory(p)
 
     def _initial_attitude(self, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> tuple[Any, Any]:
         """State and memory of the attitude filter."""
@@ -251,13 +258,19 @@ class MissionFlight:
             attitude_hears_field=attitude_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),
             attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
-            heading=None if heading is None else watched.watched_parameters(_algorithm(self._heading), heading),
+            heading=self._heading_parameters(heading),
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
             tachometer=tachometer.parameters(plant),
             array_normal_b=(x, y, z),
         )
+
+    def _heading_parameters(self, values: Values | None) -> Any:
+        """Of the Sun estimator behind the health of its sensors, None without one."""
+        if self._heading is None or values is None:
+            return None
+        return watched.watched_parameters(_algorithm(self._heading), values)
 
     def _sensors(self, values: dict[str, Values], done: list[Event], field_is_heard: bool) -> Sensors:
         array = values[self._array.name]

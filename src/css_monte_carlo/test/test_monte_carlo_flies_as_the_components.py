@@ -23,6 +23,9 @@ RODS = (
     "graph.nodes=css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_sim/magnetometer,css_estimation/ekf,"
     "sunpoint_control/mrp_control"
 )
+FAILING_WHEELS = (
+    "dynamics.faults=wheel.0 dead from 1,wheel.2 sign from 0,tachometer.1 scaled 1.5 from 3,wheel.3 stuck 0.01 from 9"
+)
 VARIANTS = {
     "each case has its own Earth": ("css_array.albedo.draw=per_cell",),
     "cells with every error": (
@@ -83,6 +86,11 @@ VARIANTS = {
         "dynamics.dispersion.friction=0.2",
         "dynamics.tachometer.resolution_rpm=1.0",
         "dynamics.tachometer.noise_rpm=2.0",
+    ),
+    "wheels and tachometers that fail, found and flown without": (FAILING_WHEELS,),
+    "the same, and nobody looks for them": (
+        FAILING_WHEELS,
+        "mrp_control.health.enabled=false",
     ),
     "late sensors": (
         "css_array.latency=0.1",

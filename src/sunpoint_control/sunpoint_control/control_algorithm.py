@@ -6,6 +6,7 @@ from typing import Any, Protocol
 
 from css_common.schema import Table, Values
 from sunpoint_control.control_output import ControlOutput
+from sunpoint_control.wheel_tracks import ControlMemory
 
 
 class ControlAlgorithm(Protocol):
@@ -31,10 +32,14 @@ class ControlAlgorithm(Protocol):
         """State before the first cycle, for given parameters."""
 
     @property
+    def initial_memory(self) -> Callable[[Any], ControlMemory]:
+        """Arrays before the first cycle, changed in place by every one; each flight needs its own."""
+
+    @property
     def step(self) -> Callable[..., tuple[Any, ControlOutput]]:
         """One cycle, a kernel.
 
-        Args: parameters; state; time [s] since the last step; direction, validity, eclipse, body rate [rad/s] and rate
-        source of the Sun estimate; wheel speeds (n,) [rad/s]; `HeldField`; motor torques (n,) [N m] and dipoles (m,)
-        [A m^2], both written. Gives the state after it and what was decided.
+        Args: parameters; state; memory; time [s] since the last step; direction, validity, eclipse, body rate [rad/s]
+        and rate source of the Sun estimate; wheel speeds (n,) [rad/s]; `HeldField`; motor torques (n,) [N m] and
+        dipoles (m,) [A m^2], both written. Gives the state after it and what was decided.
         """

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Checks of the control before a flight: gains that cannot be stable, wheels that cannot turn the body."""
 
+import math
 from collections.abc import Iterator, Mapping
 
 import numpy as np
@@ -10,6 +11,8 @@ from css_common.mission import Node
 from css_common.schema import Values
 from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
 from sunpoint_control.wheel_allocation import pseudo_inverse
+
+_ALIKE = 0.01  # relative difference of two low-passes that are one
 
 
 def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
@@ -28,8 +31,23 @@ def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]
             f"dumping.momentum: takes {fastest:.0f} rpm of a wheel, expected at most wheels.max_speed_rpm "
             f"{values.wheels.max_speed_rpm:g}"
         )
+    yield from _low_pass_finding(values, model)
     gains = Gains(values.gains.k, values.gains.p, values.gains.ki)
     yield from gain_findings(model, gains, _setting(values, model))
+
+
+def _low_pass_finding(values: Values, model: LoopModel) -> Iterator[Finding]:
+    """A low-pass on the rate that is not the one which wheel health reckons with."""
+    if not values.health.enabled or not model.gyro:
+        return
+    cutoff, gain, period = values.health.rate_cutoff, model.smoothing.rate, model.period
+    reckoned = -math.expm1(-2.0 * math.pi * cutoff * period) if cutoff > 0.0 else 1.0
+    if abs(reckoned - gain) > _ALIKE * gain:
+        right = -math.log1p(-gain) / (2.0 * math.pi * period) if gain < 1.0 else 0.0
+        yield Finding(
+            f"health.rate_cutoff: {cutoff:g} Hz given, expected {right:.3g}, that of {values.graph.estimator}: the "
+            "turning of the body could not tell a wheel from its tachometer"
+        )
 
 
 def loop_model(values: Values, graph: Mapping[str, Node]) -> LoopModel:

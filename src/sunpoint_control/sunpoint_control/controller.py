@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A control law as a component of the graph; a node file names the algorithm and what it listens to."""
 
+import math
 from collections.abc import Iterable
 from typing import ClassVar
 
@@ -8,6 +9,8 @@ import numpy as np
 
 from css_common.codec import Sample
 from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.health import KIND_SCALED, KIND_SIGN, SORT_WHEEL, Verdict
+from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.schema import Values
 from css_common.sections import wheel_axes
@@ -21,6 +24,9 @@ from sunpoint_control.modes import MODE_SAFE, REASON_COMMANDED
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 _NO_SUN = (_ZERO, SunEstimate.VALIDITY_NONE, SunEstimate.ECLIPSE_SUNLIT, _ZERO, SunEstimate.RATE_NONE)
+# no number, which a control takes for inputs that cannot be trusted: actuators at rest, soon in safe mode
+_LOST: Vec3 = (math.nan, math.nan, math.nan)
+_SUN_LOST = (_LOST, SunEstimate.VALIDITY_NONE, SunEstimate.ECLIPSE_SUNLIT, _LOST, SunEstimate.RATE_NONE)
 
 
 class Controller(Component):
@@ -28,7 +34,7 @@ class Controller(Component):
 
     Class attributes:
         algorithm: module of this shape.
-        needs_sun: without a Sun estimate there is no cycle.
+        needs_sun: without a Sun estimate there is no cycle, and in real time, which does not wait, none that acts.
         turns_wheels: it commands the wheels.
     """
 
@@ -45,6 +51,7 @@ class Controller(Component):
                 f"{values.graph.estimator}/sun_estimate",
                 SunEstimate,
                 required=cls.needs_sun,
+                outlived=cls.needs_sun,
                 used=("sun_b", "omega_bn_b"),
             )
         ]
@@ -62,6 +69,8 @@ class Controller(Component):
             outputs.insert(0, Output("wheels", "wheels/torque_command", WheelTorqueCommand, ends_cycle=True))
         if values.rods.fitted:
             outputs.append(Output("rods", "rods/dipole_command", RodDipoleCommand, ends_cycle=True))
+        if cls.turns_wheels:
+            outputs.append(health_output(name))
         return tuple(outputs)
 
     @classmethod
@@ -71,6 +80,8 @@ class Controller(Component):
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)
         self._state = self.algorithm.initial_state(self._parameters)
+        self._memory = self.algorithm.initial_memory(self._parameters)
+        self._health = HealthReport(_what_was_done)
         self._step = typed_call(self.algorithm.step)
         self._last_stamp_ns: int | None = None
         self._field = NO_FIELD_MEASURED
@@ -88,19 +99,25 @@ class Controller(Component):
         self._state, output = self._step(
             self._parameters,
             self._state,
+            self._memory,
             since_ns / 1e9,
-            *_sun(received["sun"]),
+            *_sun(received["sun"], _SUN_LOST if self.needs_sun else _NO_SUN),
             torques if wheels is None else wheels.speed,
             self._held_field(stamp_ns, received),
             torques,
             dipoles,
         )
-        return self._commands(stamp_ns, torques, dipoles, output)
+        commands = self._commands(stamp_ns, torques, dipoles, output)
+        if not self.turns_wheels:
+            return commands
+        told = self._health.told(self, stamp_ns, self._memory.verdicts, int(self._memory.body["cycle"][0]))
+        return {**commands, **told}
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
         """Actuators at rest, so that the flight goes on while the control is deactivated."""
         self._last_stamp_ns = None
         self._state = self.algorithm.initial_state(self._parameters)
+        self._memory = self.algorithm.initial_memory(self._parameters)
         return self._commands(stamp_ns, *self._actuators(), at_rest(MODE_SAFE, REASON_COMMANDED))
 
     def _actuators(self) -> tuple[np.ndarray, np.ndarray]:
@@ -145,8 +162,14 @@ class Controller(Component):
         return messages
 
 
-def _sun(sun: Sample | None) -> tuple[Vec3, int, int, Vec3, int]:
+def _what_was_done(verdict: Verdict) -> str:
+    if verdict.sort == SORT_WHEEL:
+        return "commanded by what it gives" if verdict.kind in (KIND_SCALED, KIND_SIGN) else "commanded nothing"
+    return "its speed counted from what the wheel is commanded"
+
+
+def _sun(sun: Sample | None, otherwise: tuple[Vec3, int, int, Vec3, int]) -> tuple[Vec3, int, int, Vec3, int]:
     """Direction, validity, eclipse, body rate and its source."""
     if sun is None:
-        return _NO_SUN
+        return otherwise
     return vector_of(sun.sun_b), sun.validity, sun.eclipse, vector_of(sun.omega_bn_b), sun.rate_source

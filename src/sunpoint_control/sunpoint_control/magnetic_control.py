@@ -29,11 +29,14 @@ from sunpoint_control.magnetic_spin import SpinParameters, damping_torque, spin_
 from sunpoint_control.modes import MODE_DETUMBLE, MODE_ECLIPSE, MODE_SAFE, ModeParameters, ModeState, next_mode
 from sunpoint_control.plausible import LARGEST_DIRECTION, LARGEST_RATE, within
 from sunpoint_control.torque_rods import TorqueRods, limit_dipoles, rod_dipoles, rod_torque
+from sunpoint_control.wheel_tracks import ControlMemory, new_memory
 
 # The numbers of css_msgs/SunEstimate.
 _VALIDITY_VALID = 2
 _RATE_GYRO = 1
 _RATE_FIELD = 3
+
+_SHORTEST = 1e-6  # [s] two measurements closer than that make no derivative
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
@@ -128,10 +131,16 @@ def initial_state(p: MagneticParameters) -> MagneticState:
     return MagneticState(field_motion.initial_state(), 0, _ZERO, modes.initial_state())
 
 
+def initial_memory(p: MagneticParameters) -> ControlMemory:
+    """None that it needs: rods are not judged."""
+    return new_memory(0)
+
+
 @kernel
 def step(
     p: MagneticParameters,
     state: MagneticState,
+    memory: ControlMemory,
     dt: float,
     sun_b: Vec3,
     validity: int,
@@ -144,7 +153,7 @@ def step(
     dipole_out,
 ) -> tuple[MagneticState, ControlOutput]:
     """One cycle; arguments in `sunpoint_control.control_algorithm`. Wheels are left alone."""
-    dt = dt if 0.0 < dt < math.inf else 0.0
+    dt = dt if _SHORTEST <= dt < math.inf else 0.0
     motion = follow_field(p.motion, state.motion, dt, field, state.torque_b)
     since = 0 if field.fresh else state.since_measurement + 1
     inputs_ok = within(sun_b, LARGEST_DIRECTION) and within(omega_bn_b, LARGEST_RATE)

@@ -5,7 +5,7 @@ A mode is left only when another has been wanted for several samples in a row, s
 however wrong, changes it, and the thresholds of entering and leaving differ, so that noise on one does not
 chatter.
 
-    SAFE             commanded, or inputs that are no numbers: actuators at rest
+    SAFE             commanded, inputs that are no numbers, or too few actuators left: actuators at rest
     DETUMBLE         body rate too high for pointing: rate damping
     ECLIPSE          in the shadow
     SUN_SEARCH       sunlit, but no cell sees the Sun: scripted rotation about x, then y, then a rest, again
@@ -60,6 +60,7 @@ REASON_IN_SHADOW = 5
 REASON_NO_RATE = 6
 REASON_COMMANDED = 7
 REASON_STALE_INPUT = 8
+REASON_FAULT = 9
 
 _SEARCH_PHASES = 3
 
@@ -121,12 +122,15 @@ def wanted_mode(
     pointing_error: float,
     rate: float,
     rate_known: bool,
+    disabled: bool = False,
 ) -> tuple[int, int]:
     """Mode and reason that this sample alone asks for; arguments as in `next_mode`."""
     if not inputs_ok:
         return MODE_SAFE, REASON_STALE_INPUT
     if not p.enabled:
         return MODE_SAFE, REASON_COMMANDED
+    if disabled:
+        return MODE_SAFE, REASON_FAULT
     threshold = p.detumble_exit_rate if state.mode == MODE_DETUMBLE else p.detumble_rate
     if rate_known and rate > threshold:
         return MODE_DETUMBLE, REASON_RATE_HIGH
@@ -156,6 +160,7 @@ def next_mode(
     pointing_error: float,
     rate: float,
     rate_known: bool,
+    disabled: bool = False,
 ) -> ModeState:
     """State after one sample.
 
@@ -167,12 +172,13 @@ def next_mode(
         pointing_error: array normal to estimated Sun [rad]; negative: no Sun known.
         rate: norm of the estimated body rate [rad/s].
         rate_known: there is information about it.
+        disabled: of the actuators too few are left to turn the body.
     """
     sunless_time = 0.0 if sun_valid or in_shadow else state.sunless_time + dt
     lit_time = state.lit_time + dt if sun_valid else 0.0
     search_time = state.search_time + dt if state.mode == MODE_SUN_SEARCH else 0.0
     state = ModeState(state.mode, state.reason, state.wanted, state.wanted_count, sunless_time, lit_time, search_time)
-    wanted, reason = wanted_mode(p, state, inputs_ok, in_shadow, pointing_error, rate, rate_known)
+    wanted, reason = wanted_mode(p, state, inputs_ok, in_shadow, pointing_error, rate, rate_known, disabled)
     count = 0
     mode = state.mode
     if wanted != mode:

@@ -12,15 +12,17 @@ from typing import NamedTuple
 from css_common.declared import builder, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice
-from css_common.vectors import Vec3, norm, scale
-from sunpoint_control import modes
+from css_common.vectors import Vec3, add, cross, multiply, norm, scale, subtract
+from sunpoint_control import modes, wheel_tracks
 from sunpoint_control.control_output import ControlOutput
+from sunpoint_control.health_parameters import HealthParameters
 from sunpoint_control.held_field import HeldField
 from sunpoint_control.modes import (
     MODE_DETUMBLE,
     MODE_ECLIPSE,
     MODE_SAFE,
     MODE_SUN_SEARCH,
+    REASON_FAULT,
     ModeParameters,
     ModeState,
     next_mode,
@@ -36,12 +38,25 @@ from sunpoint_control.mrp_sun_pointing import (
     tracking_torque,
 )
 from sunpoint_control.plausible import LARGEST_DIRECTION, LARGEST_FIELD, LARGEST_RATE, within
+from sunpoint_control.reallocation import acts_across, reallocate
+from sunpoint_control.torque_rods import rod_torque
 from sunpoint_control.wheel_allocation import WHEELS_OUT, AllocationParameters, allocate, limit_torques, wheel_momentum
+from sunpoint_control.wheel_health import (
+    all_as_built,
+    follow_health,
+    note_commands,
+    out_of_use,
+    speeds_taken,
+    uncommanded_torque,
+)
+from sunpoint_control.wheel_tracks import ControlMemory
+from sunpoint_control.wheel_trials import add_trials
 
 # The numbers of css_msgs/SunEstimate.
 _VALIDITY_NONE = 0
 _VALIDITY_VALID = 2
 _RATE_NONE = 0
+_RATE_GYRO = 1
 
 _ECLIPSE = {"coast": 0, "rate_damp": 1, "hold_attitude": 2}
 _COAST = _ECLIPSE["coast"]
@@ -69,6 +84,7 @@ class ControlParameters(NamedTuple):
     allocation: AllocationParameters = part(AllocationParameters)
     modes: ModeParameters = part(ModeParameters)
     dumping: DumpingParameters = part(DumpingParameters)
+    health: HealthParameters = part(HealthParameters)
 
 
 PARAMETERS = table_of(ControlParameters)
@@ -101,10 +117,16 @@ def initial_state(p: ControlParameters) -> ControlState:
     return ControlState(_ZERO, 0.0, modes.initial_state())
 
 
+def initial_memory(p: ControlParameters) -> ControlMemory:
+    """All wheels as they were built."""
+    return wheel_tracks.new_memory(len(p.allocation.wheels))
+
+
 @kernel
 def step(
     p: ControlParameters,
     state: ControlState,
+    memory: ControlMemory,
     dt: float,
     sun_b: Vec3,
     validity: int,
@@ -122,6 +144,7 @@ def step(
         dt: time since the last cycle [s].
         sun_b, validity, eclipse, omega_bn_b, rate_source: fields of the Sun estimate.
         wheel_speeds: (n,) relative to the body [rad/s].
+        memory: what is known of the wheels, changed.
         field: the measured magnetic field.
         torque_out: (n,) motor torques [N m], written.
         dipole_out: (m,) rod dipoles [A m^2], written; may be empty without rods.
@@ -134,11 +157,23 @@ def step(
     error = -1.0
     rate = 0.0
     momentum_b = _ZERO
+    allocation = p.allocation
+    isolated, spanned, as_built = 0, 3, True
     if inputs_ok:
         rate = norm(omega_bn_b)
-        momentum_b = wheel_momentum(p.allocation.wheels, p.dumping.wheel_inertia, wheel_speeds, omega_bn_b)
+        if p.health.enabled:
+            follow_health(p.health, allocation.wheels, memory, dt, wheel_speeds, omega_bn_b, rate_source == _RATE_GYRO)
+        speeds_taken(memory, wheel_speeds)
+        momentum_b = wheel_momentum(allocation.wheels, p.dumping.wheel_inertia, memory.speeds, omega_bn_b)
         if validity != _VALIDITY_NONE:
             sigma_br, error = error_mrp(sun_b, p.pointing.axis_b)
+    else:
+        memory.body[0].running = 0
+    if p.health.enabled and not all_as_built(memory):
+        as_built = False
+        isolated = out_of_use(memory)
+        spanned = reallocate(p.allocation.wheels, isolated, memory.tracks, memory.allocation)
+        allocation = AllocationParameters(p.allocation.keep_direction, memory.allocation, p.allocation.max_torque)
     rate_known = inputs_ok and rate_source != _RATE_NONE
     mode_state = next_mode(
         p.modes,
@@ -150,6 +185,7 @@ def step(
         error,
         rate,
         rate_known,
+        spanned < 2,
     )
     mode = mode_state.mode
 
@@ -180,8 +216,15 @@ def step(
             wanted_rate = scale(spin, p.pointing.axis_b) if spinning else _ZERO
             torque_b = damping_torque(p.pointing, omega_bn_b, wanted_rate)
 
-    allocate(p.allocation, torque_b, torque_out)
-    wheels_saturated = limit_torques(p.allocation, torque_out)
+    allocated_b = torque_b
+    if isolated != 0 and rate_known and mode != MODE_SAFE:
+        allocated_b = subtract(torque_b, uncommanded_torque(memory, p.allocation.wheels))
+    if spanned == 2 and rate_known and mode != MODE_SAFE and acts_across(allocation.wheels, p.pointing.axis_b):
+        # the body may go on turning about that axis, and the momentum of the wheels must not turn with it
+        turning = add(multiply(p.pointing.inertia_b, omega_bn_b), momentum_b)
+        allocated_b = add(allocated_b, cross(omega_bn_b, turning))
+    allocate(allocation, allocated_b, torque_out)
+    wheels_saturated = limit_torques(allocation, torque_out)
     integral = state.integral
     if feedback and wheels_saturated == 0:
         # held in the deadband, in the shadow and at a torque limit: what cannot act must not wind up
@@ -193,8 +236,13 @@ def step(
     allowed = mode == MODE_ECLIPSE or (mode != MODE_SAFE and not p.dumping.in_eclipse_only)
     if p.dumping.enabled and allowed and field.valid and inputs_ok and within(field.field_b, LARGEST_FIELD):
         rods_saturated, dumping = add_dumping(
-            p.dumping, p.allocation, wheel_speeds, field.field_b, torque_out, dipole_out
+            p.dumping, allocation, memory.speeds, field.field_b, torque_out, dipole_out
         )
+    if p.health.enabled:
+        if not as_built and (mode != MODE_SAFE or mode_state.reason == REASON_FAULT):
+            add_trials(memory, torque_out)
+        rods_b = rod_torque(p.dumping.rods.axes_b, dipole_out, field.field_b) if dumping else _ZERO
+        note_commands(memory, torque_out, rods_b)
     output = ControlOutput(
         torque_b,
         z,
@@ -207,7 +255,7 @@ def step(
         dumping,
         wheels_saturated,
         rods_saturated,
-        wheels_isolated=0,
+        wheels_isolated=isolated,
         rods_isolated=0,
     )
     return ControlState(integral, spin, mode_state), output

@@ -10,7 +10,7 @@ from sunpoint_control import magnetic_control, modes, sun_pointing_control
 
 @pytest.mark.parametrize(
     ("module", "message", "count"),
-    [(modes, ControlStatus, 15), (sun_pointing_control, SunEstimate, 3), (magnetic_control, SunEstimate, 3)],
+    [(modes, ControlStatus, 16), (sun_pointing_control, SunEstimate, 4), (magnetic_control, SunEstimate, 3)],
     ids=lambda value: getattr(value, "__name__", ""),
 )
 def test_numbers_are_those_of_the_message(module, message, count):

@@ -196,3 +196,15 @@ def test_conflicts_name_the_parameter():
     assert any(m.startswith("modes.point_angle_deg") for m in messages)
     assert any(m.startswith("modes.detumble_exit_rate_deg_s") for m in messages)
     assert not list(modes.conflicts(default_values(modes.PARAMETERS)))
+
+
+def test_too_few_actuators_are_safe_mode_until_there_are_enough_again():
+    state = modes.initial_state()
+    p = modes.parameters(default_values(modes.PARAMETERS))
+    seen = []
+    for disabled in [False] * 2 + [True] * 2 + [False] + [True] * 5 + [False] * 5:
+        state = modes.next_mode(p, state, 0.1, True, True, False, 1.0, 0.01, True, disabled)
+        seen.append((state.mode, state.reason))
+    assert modes.MODE_SAFE not in [mode for mode, _ in seen[:7]]
+    assert seen[9] == (modes.MODE_SAFE, modes.REASON_FAULT)
+    assert seen[-1] == (modes.MODE_SUN_ACQUISITION, modes.REASON_POINTING_ERROR)

@@ -29,6 +29,7 @@ class Cycle:
         self.values = control_values(*overrides)
         self.p = control.parameters(self.values)
         self.state = control.initial_state(self.p)
+        self.memory = control.initial_memory(self.p)
         self.omega, self.count = omega, 0
         self.divider = int(self.values.magnetometer.divider)
         self.dipoles = np.full(3, np.nan)
@@ -43,6 +44,7 @@ class Cycle:
         self.state, output = control.step(
             self.p,
             self.state,
+            self.memory,
             dt,
             sun_b,
             validity,

@@ -77,6 +77,7 @@ class Flight:
         self.omega, self.attitude = np.array(omega), Rotation.identity()
         self.field_n, self.sun_n, self.dt, self.time = field_n, np.array(sun_n), dt, 0.0
         self.state = magnetic_control.initial_state(self.p)
+        self.memory = magnetic_control.initial_memory(self.p)
         self.dipoles = np.zeros(3)
 
     def in_body(self, vector_n):
@@ -86,7 +87,7 @@ class Flight:
         field_b = self.in_body(self.field_n(self.time))
         valid = 2 if np.any(self.sun_n) else 0
         self.state, output = magnetic_control.step(
-            self.p, self.state, self.dt, self.in_body(self.sun_n), valid, 0, ZERO, 0, np.zeros(0),
+            self.p, self.state, self.memory, self.dt, self.in_body(self.sun_n), valid, 0, ZERO, 0, np.zeros(0),
             HeldField(field_b, True, True), np.zeros(0), self.dipoles,
         )  # fmt: skip
         torque_b = np.cross(self.dipoles, field_b)

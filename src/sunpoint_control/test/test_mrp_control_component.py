@@ -7,7 +7,8 @@ from okeefe_spacecraft import okeefe_values
 from sensor_msgs.msg import MagneticField
 
 from css_common.codec import codec_of
-from css_msgs.msg import ControlStatus, SunEstimate, WheelState
+from css_common.mission import load_mission
+from css_msgs.msg import ControlStatus, Faults, Health, SunEstimate, WheelState
 from sunpoint_control.modes import MODE_SAFE, MODE_SUN_ACQUISITION, REASON_COMMANDED
 from sunpoint_control.nodes.mrp_control import MrpControl
 
@@ -56,7 +57,9 @@ def test_messages_fit_their_types(rods):
     control = build(rods__fitted=rods)
     outgoing = cycle(control, 0)
     declared = {o.key: o for o in MrpControl.outputs("x", control.values)}
-    assert set(outgoing) == set(declared) == ({"wheels", "status", "rods"} if rods else {"wheels", "status"})
+    assert (
+        set(outgoing) == set(declared) - {"health"} == ({"wheels", "status", "rods"} if rods else {"wheels", "status"})
+    )
     for key, sample in outgoing.items():
         codec = codec_of(declared[key].message_type)
         again = codec.decode(codec.encode(sample))
@@ -127,3 +130,79 @@ def test_gains_change_in_flight():
 )
 def test_conflicts_are_named(changes, parameter):
     assert any(message.startswith(parameter) for message in MrpControl.conflicts(values_of(**changes)))
+
+
+def fly_with(control, steps, turn):
+    """Messages of so many cycles with a body at rest 90 deg beside the Sun; `turn`: what wheels make of torques."""
+    speed, told, statuses = np.zeros(4), [], []
+    for step in range(steps):
+        stamp_ns = control.epoch_ns + step * control.period_ns
+        inputs = received(stamp_ns)
+        inputs["sun"].sun_b, inputs["sun"].omega_bn_b = np.array([1.0, 0.0, 0.0]), np.zeros(3)
+        inputs["sun"].rate_source = SunEstimate.RATE_SUN
+        inputs["wheels"].speed = speed.copy()
+        outgoing = control.cycle(stamp_ns, inputs)
+        speed = speed + turn(outgoing["wheels"].torque) * 0.1 / 0.001
+        statuses.append(outgoing["status"])
+        if "health" in outgoing:
+            told.append(outgoing["health"])
+    return told, statuses
+
+
+def test_what_is_held_for_failed_is_told_once_and_in_the_log():
+    control = build()
+    lines: list[str] = []
+    control.report = lines.append
+    told, statuses = fly_with(control, 25, lambda torque: torque * [0.0, 1.0, 1.0, 1.0])
+    assert len(told) == 1
+    (message,) = told
+    assert (message.sort.tolist(), message.unit.tolist()) == ([Faults.SORT_WHEEL], [0])
+    assert message.evidence.tolist() == [Health.EVIDENCE_RESPONSE]
+    statistic, threshold, since_s = message.rows
+    assert statistic > threshold and since_s == 0.0
+    assert (statuses[0].wheels_isolated, statuses[-1].wheels_isolated) == (0, 1)
+    assert len(lines) == 1
+    assert lines[0].startswith("wheel.0 held for failed at ") and lines[0].endswith("; commanded nothing")
+    # a node that was deactivated knows nothing of before
+    stamp_ns = control.epoch_ns + 25 * control.period_ns
+    assert control.idle(stamp_ns, {})["status"].wheels_isolated == 0
+    again = control.cycle(stamp_ns + control.period_ns, received(stamp_ns + control.period_ns))
+    assert again["health"].unit.tolist() == []
+    assert lines[1].startswith("wheel.0 used again")
+
+
+def test_without_a_fresh_estimate_actuators_rest_at_once_and_safe_mode_says_why():
+    control = build(rods__fitted=True, dumping__enabled=True)
+    cycle(control, 0, field_at(control.epoch_ns))
+    for step in range(1, 4):
+        stamp_ns = control.epoch_ns + step * control.period_ns
+        silent = {**received(stamp_ns, field_at(stamp_ns)), "sun": None}
+        outgoing = control.cycle(stamp_ns, silent)
+        assert not np.any(outgoing["wheels"].torque)
+    assert not np.any(outgoing["rods"].dipole)
+    assert (outgoing["status"].mode, outgoing["status"].reason) == (MODE_SAFE, ControlStatus.REASON_STALE_INPUT)
+    for step in range(4, 8):
+        outgoing = cycle(control, step)
+    assert outgoing["status"].mode == MODE_SUN_ACQUISITION and np.any(outgoing["wheels"].torque)
+
+
+def test_the_estimate_may_fall_silent_in_real_time_alone_and_a_mission_must_have_it():
+    (sun, *_) = MrpControl.inputs("x", values_of())
+    assert sun.key == "sun" and sun.required and sun.outlived
+
+
+@pytest.mark.parametrize(
+    ("changes", "found"),
+    [
+        ([], False),
+        (["mrp_control.health.rate_cutoff=0.0"], True),
+        (["ekf.rate.cutoff=0.2"], True),
+        (["ekf.rate.cutoff=0.2", "mrp_control.health.rate_cutoff=0.2"], False),
+        (["mrp_control.health.rate_cutoff=0.0", "mrp_control.health.enabled=false"], False),
+        (["mrp_control.health.rate_cutoff=0.0", "ekf.use_gyro=false"], False),
+    ],
+)
+def test_a_low_pass_that_health_does_not_reckon_with_is_found_before_the_flight(changes, found):
+    graph = {node.name: node for node in load_mission("okeefe_2013", changes).nodes}
+    findings = [finding.text for finding in MrpControl.preflight(graph["mrp_control"], graph)]
+    assert any(text.startswith("health.rate_cutoff: ") for text in findings) == found

@@ -34,6 +34,7 @@ class Cycle:
     def __init__(self, **changes):
         self.p = control.parameters(okeefe_values(TABLE, **changes))
         self.state = control.initial_state(self.p)
+        self.memory = control.initial_memory(self.p)
         self.torques = np.full(4, np.nan)
         self.dipoles = np.full(3, np.nan)
 
@@ -42,7 +43,7 @@ class Cycle:
         speeds=(*ZERO, 0.0), field=ZERO, field_valid=False, dt=DT,
     ):  # fmt: skip
         self.state, output = control.step(
-            self.p, self.state, dt, sun_b, validity, eclipse, omega, source,
+            self.p, self.state, self.memory, dt, sun_b, validity, eclipse, omega, source,
             np.array(speeds, dtype=np.float64), HeldField(field, field_valid, field_valid), self.torques, self.dipoles,
         )  # fmt: skip
         return output

@@ -56,6 +56,8 @@ class AidingHealthMemory(NamedTuple):
     gyro_verdicts: np.ndarray  # (3,) of VERDICT
     field_axes: np.ndarray  # (3,) of GYRO_AXIS
     field_verdicts: np.ndarray  # (3,) of VERDICT
+    changes: np.ndarray  # (1,) how often verdicts have changed
+    told: np.ndarray  # (1,) sum over the verdicts of the last cycle
     no_speeds: np.ndarray  # (0,) of wheels that nobody reckons with
 
 
@@ -72,8 +74,21 @@ def initial_memory(p: AidingHealthParameters) -> AidingHealthMemory:
         new_verdicts(SORT_GYRO, 3),
         new_axes(),
         new_verdicts(SORT_MAGNETOMETER, 3),
+        np.zeros(1, np.int64),
+        np.zeros(1, np.int64),
         np.zeros(0),
     )
+
+
+@kernel
+def _sum_of(verdicts) -> int:
+    """A number that is another one for other verdicts (3,)."""
+    total = 0
+    for i in range(3):
+        v = verdicts[i]
+        if v.held != 0:
+            total += (i + 1) * (1 + v.kind + 1000 * v.evidence + 100_000 * v.since_step)
+    return total
 
 
 @kernel
@@ -94,6 +109,7 @@ def check_aiding(
         sight: the Sun by the cells alone, of the last cycle.
         misfits: the cells contradict a Sun line that the gyro leads.
     """
+    step = state.step + 1
     gyro, gyro_b, gyro_valid, gyro_left = check_gyro(
         p.gyro,
         state.gyro,
@@ -101,7 +117,7 @@ def check_aiding(
         memory.fits,
         memory.gyro_verdicts,
         dt,
-        state.step,
+        step,
         aiding.gyro_b,
         aiding.gyro_valid,
         sight,
@@ -113,11 +129,15 @@ def check_aiding(
         memory.field_axes,
         memory.field_verdicts,
         dt,
-        state.step,
+        step,
         aiding.field_b,
         aiding.field_valid,
         aiding.sky,
         sight,
     )
     left = (LEFT_GYRO if gyro_left else 0) + (LEFT_FIELD if field_left else 0)
-    return AidingHealthState(state.step + 1, gyro, field), Trusted(gyro_b, gyro_valid, field_b, field_valid, left)
+    told = _sum_of(memory.gyro_verdicts) + 7 * _sum_of(memory.field_verdicts)
+    if told != memory.told[0]:
+        memory.told[0] = told
+        memory.changes[0] += 1
+    return AidingHealthState(step, gyro, field), Trusted(gyro_b, gyro_valid, field_b, field_valid, left)

@@ -17,6 +17,12 @@ from css_estimation.symmetric import Symmetric, product
 _MOST = 25.0
 """Bound on the squared sigmas of a single cell, so that no single look decides."""
 
+# Variance of the Earth's light where it is a guess, by the square of its bound: that is 2.5 sigma.
+_EARTH_SHARE = 0.16
+
+SURE = 3.0
+"""Sigmas of a direction that is followed within which the edge of a view is in doubt."""
+
 HIDDEN, DOUBTFUL, SEEN = 0, 1, 2
 
 
@@ -36,17 +42,20 @@ def _spread(normal_b: Vec3, cosine: float, covariance: Symmetric, heading: float
 
 
 @kernel
-def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric, light: float) -> Expected:
+def expected(
+    p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric, light: float, sigmas: float
+) -> Expected:
     """Of cell `i` with the Sun in a unit direction.
 
     Args:
         covariance: of the direction [rad^2]; the lasting error of headings comes on top.
         light: output at normal incidence [-].
+        sigmas: of the direction within which the edge of a view is in doubt.
     """
     cell = p.layout.cells[i]
     cosine = cosine_on(p.layout, i, sun_b)
     spread = _spread((cell.nx, cell.ny, cell.nz), cosine, covariance, p.heading)
-    margin = 3.0 * math.sqrt(spread)
+    margin = sigmas * math.sqrt(spread)
     inside = cosine - p.layout.cos_half_view
     view = SEEN
     if inside < -margin:
@@ -56,7 +65,7 @@ def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric
     if cell.side != 0.0 and view != HIDDEN:
         clip = p.layout.clip_normal_b
         component = dot(clip, sun_b)
-        room = 3.0 * math.sqrt(_spread(clip, component, covariance, p.heading))
+        room = sigmas * math.sqrt(_spread(clip, component, covariance, p.heading))
         above = component if cell.side > 0.0 else -component
         if above < -room:
             view = HIDDEN
@@ -64,18 +73,37 @@ def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric
             view = DOUBTFUL
     if view == HIDDEN:
         return Expected(0.0, 0.0, p.floor, view)
+    if p.screened >> i & 1:
+        view = DOUBTFUL
     high = light * max(0.0, cosine)
     low = high if view == SEEN else 0.0
     return Expected(low, high, p.floor + p.share * high * high + light * light * spread, view)
 
 
 @kernel
-def contradiction(p: CellHealthParameters, e: Expected, output: float) -> float:
-    """Squared sigmas by which an output is outside of what is expected, with its sign, bounded."""
+def misfit(p: CellHealthParameters, e: Expected, output: float) -> float:
+    """Squared sigmas by which an output is off, bounded, where much light of the Earth is possible but unlikely."""
+    off = 0.0
+    variance = e.variance
+    if output > e.high:
+        off = output - e.high
+        variance += p.earth * p.earth * _EARTH_SHARE
+    elif output < e.low:
+        off = output - e.low
+    return min(off * off / variance, _MOST)
+
+
+@kernel
+def contradiction(p: CellHealthParameters, e: Expected, output: float, share: float) -> float:
+    """Squared sigmas by which an output is outside of what is expected, with its sign, bounded.
+
+    Args:
+        share: of the light that is left on all cells.
+    """
     off = 0.0
     if output > e.high + p.earth:
         off = output - e.high - p.earth
-    elif output < e.low:
-        off = output - e.low
+    elif output < share * e.low:
+        off = output - share * e.low
     squared = min(off * off / e.variance, _MOST)
     return squared if off > 0.0 else -squared

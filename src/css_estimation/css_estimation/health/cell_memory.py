@@ -5,11 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.health import SORT_CELL, new_verdicts
 from css_common.vectors import Mat3, Vec3
 from css_estimation.symmetric import Symmetric
 
 DIRECTIONS = 500
 """Directions among which the Sun is looked for: 9 deg from one to the next."""
+
+MOST_IN_PAIRS = 16
+"""Cells of a layout of which any two may fail together at the start; with more of them, one."""
 
 WATCHED = np.dtype(
     [
@@ -18,29 +22,44 @@ WATCHED = np.dtype(
         ("sum", np.float64),  # of outputs since the last look
         ("readings", np.int64),  # in it
         ("same", np.float64),  # how unlikely it is that a healthy one has read the same for so long, -ln
+        ("top", np.float64),  # largest output in range
         ("ripple", np.float64),  # mean size of its second differences
         ("jumps", np.float64),  # recent cycles in which it leapt
         ("out_of_range", np.float64),  # recent cycles
         ("score", np.float64),  # contradiction by the other cells
         ("first_step", np.int64),  # when that began; -1: there is none
-        ("isolated", np.int64),  # 1: left out
-        ("kind", np.int64),
-        ("evidence", np.int64),
-        ("statistic", np.float64),
-        ("threshold", np.float64),
-        ("since_step", np.int64),  # first evidence
+        ("sure", np.int64),  # 1: left out while the direction had been sure for long
         ("good", np.float64),  # [s] of agreement since it was left out
         ("times", np.int64),  # that it was left out
-        ("weight", np.float64),  # of the sums that tell kinds apart, all over what it read while it failed
-        ("read", np.float64),  # sum of its outputs
+        # what tells kinds apart: all over the cycles since the first evidence
+        ("predicted", np.float64),  # by the others at the last look; NaN: they do not know
+        ("cycles", np.float64),
+        ("seconds", np.float64),
+        ("read", np.float64),  # sum of outputs
         ("read2", np.float64),  # of their squares
-        ("expected", np.float64),  # of what the others predict
+        ("zeros", np.float64),  # cycles in which it was dark
+        ("least", np.float64),
+        ("most", np.float64),
+        ("tops", np.float64),  # cycles in which it read the most
+        ("night", np.float64),  # cycles in which no Sun was predicted on it
+        ("night_read", np.float64),  # sum of outputs in them
+        ("compared", np.float64),  # cycles in which some was, and sums over them
+        ("dark_seen", np.float64),  # cycles in which it was dark and should have been lit
+        ("lit_seen", np.float64),  # in which it was lit and should have been
+        ("agreed", np.float64),  # those of them in which it read what was predicted
+        ("leaps", np.float64),  # cycles in which it leapt
+        ("sun_read2", np.float64),  # of squares of outputs
+        ("expected", np.float64),  # of predictions
         ("expected2", np.float64),
         ("cross", np.float64),  # of output times prediction
-        ("largest", np.float64),
-        ("zeros", np.float64),  # looks at which it was dark
-        ("tops", np.float64),  # at which it was at or above the top of its range
-        ("onset", np.float64),  # [s] from first evidence to isolation
+        ("sun_off", np.float64),  # of output less prediction
+        ("sun_off2", np.float64),
+        ("told", np.float64),  # cycles with any prediction, and sums over them
+        ("off", np.float64),  # of output less prediction
+        ("off2", np.float64),
+        ("off_time", np.float64),  # of that times time
+        ("time", np.float64),
+        ("time2", np.float64),
     ],
     align=True,
 )
@@ -51,29 +70,51 @@ class CellHealthMemory(NamedTuple):
     """Of N cells; all written by `cell_health.watch_cells`."""
 
     cells: np.ndarray  # (N,) of WATCHED
-    grid: np.ndarray  # (DIRECTIONS,) logarithms of the weights of directions to the Sun
+    verdicts: np.ndarray  # (N,) of css_common.health.VERDICT
+    changes: np.ndarray  # (1,) of verdicts so far
+    grid: np.ndarray  # (hypotheses, DIRECTIONS) logarithms of weights, see `cell_search`
+    misfits: np.ndarray  # (N,) room
+    against: np.ndarray  # (N,) evidence that a cell fails, as the search has it
+    healthy: np.ndarray  # (N,) room
     means: np.ndarray  # (N,) outputs since the last look
     used: np.ndarray  # (N,) those of them that the direction rests on, NaN for others
+    judged: (
+        np.ndarray
+    )  # (N,) those that rival directions are held against: also of cells left out for the direction's sake
+    swaps: np.ndarray  # (N, N) sum of |output of i less what is predicted of j| while i is left out
+    swap_looks: np.ndarray  # (N,) looks in it
     trusted: np.ndarray  # (N,) outputs of this cycle, NaN for those that are left out
 
 
-class CellHealthState(NamedTuple):
-    """Beside the memory: the Sun as the cells together see it."""
+class Track(NamedTuple):
+    """The Sun as the cells together see it."""
 
     phase: int  # PHASE_*
     since: float  # [s] of light in this phase
-    lost: float  # how long most cells have contradicted the direction [s]
+    faded: float  # [s] for how long all that should be lit have been darker than they should
+    calm: float  # [s] for how long all cells have been explained while several saw the Sun, at most a bound
+    doubt: float  # [s] for which the search goes on beside it
+    searched: float  # [s] since its last look
     sun_b: Vec3
     covariance: Symmetric  # [rad^2]
     light: float  # [-] output over cosine, in common
-    frame: Mat3  # from the frame in which directions of the grid are fixed to b
+    frame: Mat3  # from the frame in which directions of the search are fixed to b
+
+
+class CellHealthState(NamedTuple):
+    """Beside the memory."""
+
+    track: Track
     turn_b: Vec3  # [rad] since the last look
     window: float  # [s] since the last look
-    dark: float  # [s] without any light
+    night: float  # [s] for which the model of the orbit has had no Sun
     step: int  # number of this cycle
     isolated: int  # mask
     least_change: float  # [-] smallest change of any output from cycle to cycle: a step of the converter, or less
 
+
+NO_SIGNAL, OUT_OF_RANGE, LEAPING, STUCK = 0, 1, 2, 3
+"""What a cell shows by itself."""
 
 PHASE_LOOKING, PHASE_FOLLOWING, PHASE_SETTLED = 0, 1, 2
 
@@ -82,4 +123,20 @@ def new_memory(cells: int) -> CellHealthMemory:
     """Nothing read yet."""
     watched = np.zeros(cells, WATCHED)
     watched["first_step"] = -1
-    return CellHealthMemory(watched, np.zeros(DIRECTIONS), *(np.zeros(cells) for _ in range(3)))
+    hypotheses = 1 + cells + (cells * (cells - 1) // 2 if cells <= MOST_IN_PAIRS else 0)
+    misfits, against, healthy, means, used, judged, swap_looks, trusted = (np.zeros(cells) for _ in range(8))
+    return CellHealthMemory(
+        watched,
+        new_verdicts(SORT_CELL, cells),
+        np.zeros(1, np.int64),
+        np.zeros((hypotheses, DIRECTIONS)),
+        misfits,
+        against,
+        healthy,
+        means,
+        used,
+        judged,
+        np.zeros((cells, cells)),
+        swap_looks,
+        trusted,
+    )

@@ -4,9 +4,11 @@
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from css_common.conversions import square
 from css_common.declared import builder, computed, given, made, table_of
-from css_common.schema import flag, real
+from css_common.schema import Values, flag, integers, real
 from css_estimation.sun.cell_layout import CellLayout, cell_layout
 
 ENABLED = flag("health.enabled", True, "leave out cells that fail, by what the others read")
@@ -14,10 +16,28 @@ ENABLED = flag("health.enabled", True, "leave out cells that fail, by what the o
 _NAMED = "health.cells."
 
 
+_SCREENED = integers(
+    _NAMED + "screened",
+    (),
+    "-",
+    "cells, from 0, that structure hides in part: what their normals make of the Sun they may read, or less",
+    low=0,
+    high=31,
+)
+
+
+def _screened(values: Values) -> int:
+    mask = 0
+    for i in np.asarray(values[_SCREENED]).tolist():
+        mask |= 1 << i
+    return mask
+
+
 class CellHealthParameters(NamedTuple):
     """What a healthy cell may do."""
 
     layout: CellLayout = computed(cell_layout)
+    screened: int = computed(_screened, _SCREENED)  # mask
     largest: float = given(
         real(_NAMED + "largest", 1.3, "-", "no healthy cell reads more, calibration and Earth included", low=0.1)
     )

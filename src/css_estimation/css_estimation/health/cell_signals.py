@@ -9,7 +9,8 @@ output again and again: as unlikely as others that are lit change.
 import math
 
 from css_common.kernel import kernel
-from css_estimation.health.cell_memory import CellHealthMemory
+from css_estimation.health.cell_kinds import add_output
+from css_estimation.health.cell_memory import LEAPING, NO_SIGNAL, OUT_OF_RANGE, STUCK, CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.cell_layout import READABLE
 
@@ -22,17 +23,15 @@ _KEPT = 0.9  # of counts of recent cycles
 _MOST_LEAPS, _MOST_OUT_OF_RANGE = 3.5, 2.5
 _UNLIKELY = 14.0  # -ln of a chance of 1e-6
 _LIT = 0.1  # output above which a cell tells how others change
+_FULL = 0.9  # above it the largest output that any cell has had may be the converter's
 _DARK = 0.05  # below which nothing need change
 _STEPS = 3.0  # of a converter that the ripple of others has to exceed before an output has to change
 
-NO_SIGNAL, OUT_OF_RANGE, LEAPING, STUCK = 0, 1, 2, 3
-
 
 @kernel
-def is_reading(v: float) -> bool:
-    """Whether an output is one of a cell."""
-    # a NaN compares false
-    return abs(v) < READABLE
+def reading(v: float) -> float:
+    """An output as it is looked at: no more than a cell can read, also of one at the limit of its converter; or NaN."""
+    return min(max(v, -READABLE), READABLE) if abs(v) < math.inf else math.nan
 
 
 @kernel
@@ -74,34 +73,41 @@ def note_outputs(
         rate: [rad/s] at which the body turns, as far as it is known.
     """
     turn = max(rate, _FASTEST) * dt
+    top = 0.0
     for i in range(voltages.shape[0]):
-        cell, v = memory.cells[i], voltages[i]
-        if is_reading(v) and is_reading(cell.last):
-            change = abs(v - cell.last)
-            if change > 0.0:
-                least_change = min(least_change, change)
+        cell, v = memory.cells[i], reading(voltages[i])
+        # a NaN compares false
+        if v > cell.top and in_range(p, v):
+            cell.top = v
+        top = max(top, cell.top)
+        change = abs(v - cell.last)
+        if change > 0.0:
+            least_change = min(least_change, change)
     for i in range(voltages.shape[0]):
-        cell, v = memory.cells[i], voltages[i]
+        cell, v = memory.cells[i], reading(voltages[i])
         cell.out_of_range *= _KEPT
         cell.jumps *= _KEPT
-        if is_reading(v):
+        if not math.isnan(v):
             if not in_range(p, v):
                 cell.out_of_range += 1.0
-            if is_reading(cell.last) and is_reading(cell.before):
-                second = abs(v - 2.0 * cell.last + cell.before)
+            second = abs(v - 2.0 * cell.last + cell.before)
+            if not math.isnan(second):
                 largest = max(v, cell.last, cell.before)
                 if second > max(_LEAP * p.noise, _LEAP_SHARE * largest) + 3.0 * turn * turn:
                     cell.jumps += 1.0
+                    cell.leaps += 1.0
                 cell.ripple = 0.95 * cell.ripple + 0.05 * min(second, _LEAP_SHARE * largest)
             if v != cell.last:
                 cell.same = 0.0
-            elif v > _DARK:
+            elif v > _DARK and not (v == top and v > _FULL):
                 cell.same += _surprise(memory, voltages, i, least_change)
             cell.sum += v
             cell.readings += 1
+            if memory.verdicts[i].held == 1 or cell.first_step >= 0:
+                add_output(cell, v, dt)
     for i in range(voltages.shape[0]):
         cell = memory.cells[i]
-        cell.before, cell.last = cell.last, voltages[i]
+        cell.before, cell.last = cell.last, reading(voltages[i])
     return least_change
 
 
@@ -111,7 +117,7 @@ def _surprise(memory: CellHealthMemory, voltages, i: int, least_change: float) -
     lit = changed = 0
     for j in range(voltages.shape[0]):
         other = memory.cells[j]
-        if j == i or not is_reading(voltages[j]) or not voltages[j] > _LIT:
+        if j == i or not _LIT < voltages[j] <= READABLE:
             continue
         lit += 1
         ripple = other.ripple * min(1.0, voltages[i] / voltages[j])

@@ -6,9 +6,14 @@
 out is one whose output is missing.
 """
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from css_common.declared import builder
+from css_common.health import SORT_CELL, new_verdicts
+from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3
 from css_estimation.health import aiding_health, cell_health, cell_memory, cell_options, gyroless_sight
@@ -16,6 +21,7 @@ from css_estimation.health.aiding_health import (
     AidingHealthMemory,
     AidingHealthParameters,
     AidingHealthState,
+    Trusted,
     check_aiding,
 )
 from css_estimation.health.cell_health import watch_cells
@@ -23,12 +29,21 @@ from css_estimation.health.cell_memory import PHASE_LOOKING, CellHealthMemory, C
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.health.gyroless_sight import Gyroless, Led, contradicts, follow_gyro, look
 from css_estimation.sun import heading_dispatch
-from css_estimation.sun.sun_heading import RATE_NONE, Aiding, SunHeading
-from css_estimation.sun.sun_tracking import elapsed
+from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, Aiding, SunHeading
+from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
 from css_estimation.sun.sunline_ekf import EkfParameters
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS, *aiding_health.PARAMETERS)
+NO_VERDICTS = new_verdicts(SORT_CELL, 0)
 _cell_parameters = builder(CellHealthParameters)
+
+
+class AidingWatch(NamedTuple):
+    """Gyro and magnetometer, and what they are held against."""
+
+    sight: Gyroless
+    led: Led
+    health: AidingHealthState
 
 
 class Watched(NamedTuple):
@@ -38,18 +53,17 @@ class Watched(NamedTuple):
     led: EkfParameters
     aiding: AidingHealthParameters
     cells: CellHealthParameters
+    use_gyro: bool
     own: Any  # of the algorithm
 
 
 class WatchedState(NamedTuple):
     """Carried from cycle to cycle."""
 
-    sight: Gyroless
-    led: Led
-    aiding: AidingHealthState
+    aiding: AidingWatch
     cells: CellHealthState
     omega_bn_b: Vec3  # [rad/s] of the last heading
-    rate_known: bool
+    rate_source: int  # of that
     own: Any
 
 
@@ -64,6 +78,7 @@ class WatchedMemory(NamedTuple):
 def watched_parameters(algorithm: Any, values: Values) -> Any:
     """Parameters of an algorithm, behind the health of its sensors unless that is switched off."""
     own = algorithm.parameters(values)
+    use_gyro = bool(values[USE_GYRO]) if USE_GYRO in values else False
     if not values[ENABLED]:
         return own
     return Watched(
@@ -71,6 +86,7 @@ def watched_parameters(algorithm: Any, values: Values) -> Any:
         gyroless_sight.gyro_led_parameters(values),
         aiding_health.parameters(values),
         _cell_parameters(values),
+        use_gyro,
         own,
     )
 
@@ -79,15 +95,12 @@ def initial_state(algorithm: Any, p: Any) -> Any:
     """State for parameters of `watched_parameters`."""
     if not isinstance(p, Watched):
         return algorithm.initial_state(p)
-    return WatchedState(
+    aiding = AidingWatch(
         gyroless_sight.initial_state(p.sight),
         gyroless_sight.initial_led(p.led),
         aiding_health.initial_state(p.aiding),
-        cell_health.initial_state(),
-        (0.0, 0.0, 0.0),
-        False,
-        algorithm.initial_state(p.own),
     )
+    return WatchedState(aiding, cell_health.initial_state(), (0.0, 0.0, 0.0), RATE_NONE, algorithm.initial_state(p.own))
 
 
 def initial_memory(algorithm: Any, p: Any) -> Any:
@@ -101,58 +114,67 @@ def initial_memory(algorithm: Any, p: Any) -> Any:
     )
 
 
-def watched_heading(p, state, memory, dt, voltages, aiding):
-    """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
-    dt_known = elapsed(dt)
-    # by the outputs of the last cycle: those of this one are judged with the gyro
-    sight_state, sight = look(
-        p.sight,
-        state.sight,
-        dt_known,
-        memory.cells.trusted,
-        memory.aiding.no_speeds,
-        aiding.sky,
-        state.cells.phase != PHASE_LOOKING,
-        state.cells.sun_b,
-    )
+def verdicts_of(memory: Any) -> np.ndarray:
+    """Rows of `css_common.health.VERDICT` of a memory of `initial_memory`."""
+    if not isinstance(memory, WatchedMemory):
+        return NO_VERDICTS
+    aiding = memory.aiding
+    return np.concatenate((memory.cells.verdicts, aiding.gyro_verdicts, aiding.field_verdicts))
+
+
+def verdict_changes(memory: Any) -> int:
+    """How often verdicts have changed so far."""
+    if not isinstance(memory, WatchedMemory):
+        return 0
+    return int(memory.cells.changes[0] + memory.aiding.changes[0])
+
+
+@kernel
+def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWatch, Trusted]:
+    """Gyro and magnetometer, held against the cells of the last cycle: those of this one are judged with the gyro."""
+    dt = elapsed(dt)
+    before = state.aiding
+    voltages, no_speeds = memory.cells.trusted, memory.aiding.no_speeds
+    found = state.cells.phase != PHASE_LOOKING
+    sight, glimpse = look(p.sight, before.sight, dt, voltages, no_speeds, aiding.sky, found, state.cells.sun_b)
+    readings = before.health.gyro.readings
+    read = readings.spoken and readings.silent == 0.0
     led = follow_gyro(
         p.led,
-        state.led,
-        dt_known,
-        memory.cells.trusted,
-        memory.aiding.no_speeds,
+        before.led,
+        dt,
+        voltages,
+        no_speeds,
         aiding.sky,
-        state.aiding.gyro.readings.rate_b,
-        state.aiding.gyro.readings.spoken and state.aiding.gyro.readings.silent == 0.0,
-        sight,
+        readings.rate_b,
+        read,
+        glimpse,
         p.aiding.gyro.largest_misfit,
     )
-    aiding_state, trusted = check_aiding(
-        p.aiding, state.aiding, memory.aiding, dt_known, aiding, sight, contradicts(led)
-    )
-    aiding = Aiding(
-        trusted.gyro_b,
-        trusted.gyro_valid,
-        trusted.field_b,
-        trusted.field_valid,
-        aiding.wheel_speeds,
-        aiding.wheels_valid,
-        aiding.sky,
-    )
-    gyro_speaks = aiding.gyro_valid
+    health, trusted = check_aiding(p.aiding, before.health, memory.aiding, dt, aiding, glimpse, contradicts(led))
+    return AidingWatch(sight, led, health), trusted
+
+
+@kernel
+def _watch_sensors(p, state, memory, dt: float, voltages, aiding: Aiding) -> CellHealthState:
+    gyro_speaks = p.use_gyro and aiding.gyro_valid
+    source = RATE_GYRO if gyro_speaks else state.rate_source
     omega_bn_b = aiding.gyro_b if gyro_speaks else state.omega_bn_b
-    cells = watch_cells(
+    return watch_cells(
         p.cells,
         state.cells,
         memory.cells,
-        dt_known,
+        elapsed(dt),
         voltages,
         omega_bn_b,
-        gyro_speaks or state.rate_known,
+        source,
         aiding.sky,
     )
-    own, said = heading_dispatch.estimate_heading(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
-    heading = SunHeading(
+
+
+@kernel
+def _with_health(said: SunHeading, cells: CellHealthState, sensors_left: int) -> SunHeading:
+    return SunHeading(
         said.sun_b,
         said.covariance,
         said.omega_bn_b,
@@ -165,8 +187,33 @@ def watched_heading(p, state, memory, dt, voltages, aiding):
         said.eclipse,
         said.mode,
         cells.isolated,
-        trusted.left,
+        sensors_left,
     )
-    return WatchedState(
-        sight_state, led, aiding_state, cells, said.omega_bn_b, said.rate_source != RATE_NONE, own
-    ), heading
+
+
+def watched_heading(p: Any, state: Any, memory: Any, dt: Any, voltages: Any, aiding: Any) -> Any:
+    """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
+    watch, t = _watch_aiding(p, state, memory, dt, aiding)
+    speeds, sky = aiding.wheel_speeds, aiding.sky
+    # here, as kernels hand no arrays back
+    aiding = Aiding(t.gyro_b, t.gyro_valid, t.field_b, t.field_valid, speeds, aiding.wheels_valid, sky)
+    cells = _watch_sensors(p, state, memory, dt, voltages, aiding)
+    own, said = heading_dispatch.estimate_heading(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
+    return WatchedState(watch, cells, said.omega_bn_b, said.rate_source, own), _with_health(said, cells, t.left)
+
+
+def stepped_by(step: Callable[..., Any]) -> Callable[..., Any]:
+    """What does the same with the `step` of an algorithm whose parameters are of the type of another's."""
+
+    def heading(p: Any, state: Any, memory: Any, dt: float, voltages: np.ndarray, aiding: Aiding) -> Any:
+        if not isinstance(p, Watched):
+            return step(p, state, memory, dt, voltages, aiding)
+        watch, t = _watch_aiding(p, state, memory, dt, aiding)
+        speeds, sky = aiding.wheel_speeds, aiding.sky
+        # here, as kernels hand no arrays back
+        aiding = Aiding(t.gyro_b, t.gyro_valid, t.field_b, t.field_valid, speeds, aiding.wheels_valid, sky)
+        cells = _watch_sensors(p, state, memory, dt, voltages, aiding)
+        own, said = step(p.own, state.own, memory.own, dt, memory.cells.trusted, aiding)
+        return WatchedState(watch, cells, said.omega_bn_b, said.rate_source, own), _with_health(said, cells, t.left)
+
+    return heading

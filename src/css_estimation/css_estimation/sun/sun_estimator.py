@@ -8,6 +8,7 @@ import numpy as np
 
 from css_common.component import Component, Cycles, Input, Outgoing, Output, Received, Smoothing
 from css_common.declared import merged
+from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.message_columns import Columns
 from css_common.schema import Table, Values
@@ -17,6 +18,7 @@ from css_estimation.health import watched
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
 from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
+from css_estimation.sun.heading_dispatch import home_of
 from css_estimation.sun.heading_loop import cycle_of
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
@@ -114,7 +116,8 @@ class SunEstimator(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("estimate", f"{name}/sun_estimate", SunEstimate, ends_cycle=True),)
+        estimate = Output("estimate", f"{name}/sun_estimate", SunEstimate, ends_cycle=True)
+        return (estimate, health_output(name)) if values[watched.ENABLED] else (estimate,)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -138,10 +141,18 @@ class SunEstimator(Component):
         self._parameters = watched.watched_parameters(self.algorithm, self.values)
         self._state = watched.initial_state(self.algorithm, self._parameters)
         self._memory = watched.initial_memory(self.algorithm, self._parameters)
-        self._step = typed_call(cycle_of(self.algorithm.step.__module__))
+        own = self._parameters.own if isinstance(self._parameters, watched.Watched) else self._parameters
+        # the loop finds `step` by the type of the parameters, which may be those of another module
+        self._is_found = getattr(home_of(own), "step", None) is self.algorithm.step
+        if self._is_found:
+            self._step = typed_call(cycle_of(self.algorithm.step.__module__))
+        else:
+            self._step = watched.stepped_by(self.algorithm.step)
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
         self._sky = flight_sky(self.values)
+        self._health = HealthReport() if self.values[watched.ENABLED] else None
+        self._cycles = 0
 
     def tune(self, values: Values) -> None:
         super().tune(values)
@@ -153,7 +164,7 @@ class SunEstimator(Component):
         from css_estimation.sun.sky_table import sky_table
 
         measured = measured_in(steps)
-        if measured is None:
+        if measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
             return None
         stamps = steps.stamps_ns
         before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns
@@ -161,7 +172,12 @@ class SunEstimator(Component):
         headings = new_headings(len(stamps))
         advance = loop_of(self.algorithm.step.__module__)
         sky = sky_table(self._sky, stamps.tolist())
+        changes = watched.verdict_changes(self._memory)
         self._state = advance(self._parameters, self._state, self._memory, since_s, measured, *sky, headings)
+        if self._health is not None and changes != watched.verdict_changes(self._memory):
+            # to be done again cycle by cycle, so that each change is told at its stamp
+            return None
+        self._cycles += len(stamps)
         self._last_stamp_ns = int(stamps[-1])
         if self._mode_log is not None:
             for stamp_ns, mode in zip(stamps.tolist(), headings.mode.tolist(), strict=True):
@@ -183,7 +199,25 @@ class SunEstimator(Component):
             aiding,
         )
         self._tell(stamp_ns, heading.mode)
-        return {"estimate": self.message("estimate", stamp_ns, **sun_estimate_fields(heading))}
+        estimate = self.message("estimate", stamp_ns, **sun_estimate_fields(heading))
+        return {"estimate": estimate, **self._told_health(stamp_ns)}
+
+    def _silent_so_far(self, stamp_ns: int) -> bool:
+        """Whether nothing need be told of health before a verdict changes, in cycles from a stamp on."""
+        if self._health is None or self._cycles > 0:
+            return True
+        if self.step_of(stamp_ns) != 0:
+            return False
+        # at the first stamp of a flight no verdict is no news
+        self._health.told(self, stamp_ns, watched.verdicts_of(self._memory), 0)
+        return True
+
+    def _told_health(self, stamp_ns: int) -> Outgoing:
+        """What is said of the health of sensors after a cycle, if that has changed."""
+        if self._health is None:
+            return {}
+        self._cycles += 1
+        return self._health.told(self, stamp_ns, watched.verdicts_of(self._memory), self._cycles)
 
     def _tell(self, stamp_ns: int, mode: int) -> None:
         line = self._mode_log.line(stamp_ns, mode) if self._mode_log is not None else None

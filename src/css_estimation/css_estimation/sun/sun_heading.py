@@ -96,5 +96,6 @@ class SunHeading(NamedTuple):
     rate_source: int  # RATE_*
     eclipse: int  # ECLIPSE_*
     mode: int  # documented with the estimator
-    isolated: int  # bit i: cell i is held for failed
-    sensors_left: int  # LEFT_*, added
+    # of the health of sensors, which an algorithm need not fill in
+    isolated: int = 0  # bit i: cell i is held for failed
+    sensors_left: int = 0  # LEFT_*, added
