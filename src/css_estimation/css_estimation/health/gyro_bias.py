@@ -86,7 +86,7 @@ def axis_significance(bias: Bias, axis: int, usual: float) -> float:
 
 @kernel
 def variance_along(bias: Bias, direction: Vec3) -> float:
-    """Variance of the bias along a unit vector [rad2/s2]; along a line that never turned in b, that of the beginning."""
+    """Variance of the bias along a unit vector [rad2/s2]; along a line at rest in b, that of the beginning."""
     return dot(direction, product(bias.covariance, direction))
 
 

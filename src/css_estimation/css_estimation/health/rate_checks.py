@@ -62,7 +62,7 @@ SAMPLE_GOOD, SAMPLE_REFUSED, SAMPLE_JUMPED, SAMPLE_STUCK, SAMPLE_RANGE, SAMPLE_N
 
 
 def gamma_quantile(degrees_of_freedom: float, sigmas: float) -> float:
-    """Chi-square over its degrees of freedom that is passed as rarely as a normal passes `sigmas` (Wilson, Hilferty)."""
+    """Chi-square over its degrees of freedom, passed as rarely as a normal passes `sigmas` (Wilson and Hilferty)."""
     k = 2.0 / (9.0 * degrees_of_freedom)
     return (1.0 - k + sigmas * math.sqrt(k)) ** 3
 

@@ -135,8 +135,8 @@ def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWa
     dt = elapsed(dt)
     before = state.aiding
     voltages, no_speeds = memory.cells.trusted, memory.aiding.no_speeds
-    found = state.cells.phase != PHASE_LOOKING
-    sight, glimpse = look(p.sight, before.sight, dt, voltages, no_speeds, aiding.sky, found, state.cells.sun_b)
+    found = state.cells.track.phase != PHASE_LOOKING
+    sight, glimpse = look(p.sight, before.sight, dt, voltages, no_speeds, aiding.sky, found, state.cells.track.sun_b)
     readings = before.health.gyro.readings
     read = readings.spoken and readings.silent == 0.0
     led = follow_gyro(
@@ -191,7 +191,8 @@ def _with_health(said: SunHeading, cells: CellHealthState, sensors_left: int) ->
     )
 
 
-def watched_heading(p: Any, state: Any, memory: Any, dt: Any, voltages: Any, aiding: Any) -> Any:
+# an overload whose annotations are not those of what it stands for is none
+def watched_heading(p, state, memory, dt, voltages, aiding):  # noqa: ANN201
     """State and `SunHeading` after a cycle; compiled with who calls it, for each algorithm."""
     watch, t = _watch_aiding(p, state, memory, dt, aiding)
     speeds, sky = aiding.wheel_speeds, aiding.sky
