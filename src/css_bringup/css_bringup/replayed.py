@@ -94,8 +94,9 @@ class Replayed:
             return []
         self.messages += len(given)
         if self.comparison is not None:
-            for _, sample, data in given:
-                self.comparison.add(sample.stamp_ns, data)
+            for port, sample, data in given:
+                if port.key in self.stepper.dividers:
+                    self.comparison.add(sample.stamp_ns, data)
         return given
 
     def is_quiet(self, stamp_ns: int) -> bool:

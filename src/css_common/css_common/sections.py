@@ -15,6 +15,7 @@ import numpy as np
 from css_common.codec import MAX_FRAME
 from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
+from css_common.link_kinds import LINK_FAULTS
 from css_common.schema import Table, Values, choice, flag, integer, real, reals, shown, text, texts
 from css_common.section import Section, unit_rows
 
@@ -288,6 +289,7 @@ IO: Table = (
         "whose messages are taken: first: one writer a topic until it is gone, the mission's own before others; "
         "graph: only the node that the mission names for a topic",
     ),
+    LINK_FAULTS,
     real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001),
     flag("autostart", True, "configure and activate without being asked"),
 )

@@ -17,7 +17,7 @@ from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
 from css_monte_carlo.attitude_guess import takes_guess
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.direct_flight import configured, is_attitude_filter
+from css_monte_carlo.direct_flight import configured, is_attitude_filter, refuse_what_needs_the_graph
 from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
 from css_monte_carlo.mission_parts import NoPlace, parts_of
 from css_monte_carlo.percentiles import over_cases
@@ -118,6 +118,8 @@ def run_study(
     """
     configurations = tuple(configurations)
     missions = [configuration.applied(mission) for configuration in configurations]
+    for flown in missions:
+        refuse_what_needs_the_graph(flown)
     stepped = [_why_stepped(flown, c.estimator) for flown, c in zip(missions, configurations, strict=True)]
     if guess_deg > 0.0:
         for configuration, flies, reason in zip(configurations, missions, stepped, strict=True):

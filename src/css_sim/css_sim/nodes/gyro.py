@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from sensor_msgs.msg import Imu
 
+from css_common.case_faults import CaseFault
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.fault_lines import Units
@@ -21,7 +22,6 @@ from css_sim import axis_faults, failing, gyro, latency
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
 from css_sim.fault_effects import GYRO, is_silent
-from css_sim.faults import CaseFault
 from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])

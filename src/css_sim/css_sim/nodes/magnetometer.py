@@ -7,6 +7,7 @@ import numpy as np
 from sensor_msgs.msg import MagneticField
 
 from css_common.attitude import mrp_to_dcm
+from css_common.case_faults import CaseFault
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.fault_lines import Units
@@ -21,7 +22,6 @@ from css_sim import axis_faults, failing, latency, magnetometer
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
 from css_sim.fault_effects import MAGNETOMETER, is_silent
-from css_sim.faults import CaseFault
 from css_sim.latency import Moment
 from css_sim.sensing import sense_field
 from css_sim.sensor_checks import LOUDEST_FIELD_NT, noise_findings
