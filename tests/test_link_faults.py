@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flights import fly_composed, messages_by_topic
+from presence import present
 
 from css_analysis.flight_log import read_flight
 from css_bringup.commands import fly
@@ -106,7 +107,7 @@ def test_without_a_voltage_there_is_no_estimate_no_command_and_the_wheels_rest(t
     assert gaps(bag, "/ekf/sun_estimate") == gaps(bag, "/wheels/torque_command") == lost
     log = read_flight(bag)
     # the torque of the step that ended at a stamp
-    rests = np.flatnonzero(np.all(log.wheels.torque[1:] == 0.0, axis=1))
+    rests = np.flatnonzero(np.all(present(log.wheels).torque[1:] == 0.0, axis=1))
     assert rests.tolist() == lost
     assert len(log.estimates["ekf"]) == 240 - len(lost)
 
@@ -114,7 +115,7 @@ def test_without_a_voltage_there_is_no_estimate_no_command_and_the_wheels_rest(t
 def test_a_lost_command_is_a_torque_of_zero(tmp_path):
     line = "      a: {time: 1.0, end: 2.0, target: message.wheels/torque_command, kind: dropped, share: 1.0}"
     fly_composed(mission_with(line, 4.0), tmp_path / "bag")
-    torque = read_flight(tmp_path / "bag").wheels.torque
+    torque = present(read_flight(tmp_path / "bag").wheels).torque
     assert np.all(torque[11:21] == 0.0) and np.all(np.any(torque[1:11] != 0.0, axis=1))
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from css_common import link_kinds
+from css_common.case_faults import NEVER, CaseFault
 from css_common.codec import Sample
 from css_common.fault_lines import Units
 from css_sim.fault_kinds import AXES, KINDS, SORTS
@@ -64,6 +65,19 @@ def fault_records(told: Iterable[Sample], epoch_ns: int, names: Units | None = N
                 acting[fault] = len(records)
                 records.append(_record(fault, now_s, known))
     return records
+
+
+def case_record(fault: CaseFault, period_s: float, names: Units) -> FaultRecord:
+    """A fault of a case as its flight would tell it.
+
+    Args:
+        fault: which begins at some time.
+        period_s: control cycle [s].
+        names: of the units of its node, by their sort.
+    """
+    told = (fault.sort, fault.unit, fault.kind, *fault.values)
+    record = _record(told, fault.first_step * period_s, names)
+    return record._replace(end_s=None if fault.end_step >= NEVER else fault.end_step * period_s)
 
 
 def _faults_of(message: Sample) -> Iterator[tuple]:

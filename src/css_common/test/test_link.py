@@ -118,7 +118,7 @@ def test_a_share_is_the_probability_of_each_message_independent_of_the_last_one(
 
 
 def test_a_corrupted_message_differs_in_one_bit_of_one_number_each_equally_likely():
-    flipped = Counter()
+    flipped: Counter[int] = Counter()
     steps_ = stepper("message.imu corrupted 1")
     clean = stepper()
     for step in range(4000):

@@ -34,7 +34,7 @@ class Failing:
     def __init__(self, faults: Sequence[CaseFault], before: "Failing | None" = None) -> None:
         """Faults from the first step on, or for a node that begins anew after those that it told `before`."""
         self._faults: Sequence[CaseFault] = ()
-        self._teller = Teller(before._teller if before is not None else None)
+        self._teller: Teller = Teller(before._teller if before is not None else None)
         self.table = NO_FAULTS
         self.take(faults)
 

@@ -40,6 +40,10 @@ def flown(*lines, steps=300, each=10):
     return given, come
 
 
+def all_of(cycles):
+    return [pulse for pulses in cycles for pulse in pulses]
+
+
 def test_a_dead_head_is_silent_from_its_time_to_its_end_and_the_other_is_not():
     given, come = flown("head.1 dead from 1 to 2", steps=30)
     for step in range(30):
@@ -49,15 +53,15 @@ def test_a_dead_head_is_silent_from_its_time_to_its_end_and_the_other_is_not():
 
 def test_a_share_of_pulses_is_dropped():
     given, come = flown("head.0 dropped 0.3")
-    lost = {*sum(given, [])} - {*sum(come, [])}
+    lost = {*all_of(given)} - {*all_of(come)}
     assert {p.head for p in lost} == {0}
     assert stats.binomtest(len(lost), 3000, 0.3).pvalue > SIGNIFICANCE
 
 
 def test_a_share_of_pulses_comes_again_later():
     given, come = flown("head.0 doubled 0.4 250")
-    healthy = {*sum(given, [])}
-    extra = [p for p in sum(come, []) if p not in healthy]
+    healthy = {*all_of(given)}
+    extra = [p for p in all_of(come) if p not in healthy]
     assert all(p.head == 0 and p._replace(ticks=p.ticks - 250) in healthy for p in extra)
     assert stats.binomtest(len(extra), 3000, 0.4).pvalue > SIGNIFICANCE
 
@@ -80,7 +84,7 @@ def test_spurious_pulses_are_a_poisson_process_from_any_slit():
     expected = stats.poisson(2.0).pmf(np.arange(7)) * 3000
     found = np.bincount(np.minimum(counts, 7), minlength=8)
     assert stats.chisquare(found, [*expected, 3000 - expected.sum()]).pvalue > SIGNIFICANCE
-    pulses = sum(extra, [])
+    pulses = all_of(extra)
     assert {p.head for p in pulses} == {1}
     within = np.array([p.ticks % COUNTS for p in pulses]) / COUNTS
     assert stats.kstest(within, "uniform").pvalue > SIGNIFICANCE
@@ -90,7 +94,7 @@ def test_spurious_pulses_are_a_poisson_process_from_any_slit():
 def test_faults_have_draws_of_their_own():
     _, one = flown("head.0 dropped 0.5")
     _, both = flown("head.0 dropped 0.5", "head.0 dropped 0.5")
-    left = sum(p.head == 0 for p in sum(both, []))
+    left = sum(p.head == 0 for p in all_of(both))
     assert stats.binomtest(left, 3000, 0.25).pvalue > SIGNIFICANCE
     assert one == flown("head.0 dropped 0.5")[1]
 

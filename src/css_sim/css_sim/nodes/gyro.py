@@ -60,15 +60,19 @@ class Gyro(Component):
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
         self._failing = Failing(self._case_faults(), self._failing)
-        self._p = gyro.parameters(self.values)
+        self._take_noise()
         self._errors = gyro.draw_errors(self._p, self._key)
         self._measure = typed_call(gyro.measure)
         self._delayed = Delayed(latency.parameters(self.values), self._key, latency.GYRO)
-        self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._take_noise()
         self._failing.take(self._case_faults())
+
+    def _take_noise(self) -> None:
+        self._p = gyro.parameters(self.values)
+        self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def _case_faults(self) -> list[CaseFault]:
         return axis_faults.case_faults(self.values, "gyro", self._key)

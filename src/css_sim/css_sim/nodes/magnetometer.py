@@ -66,14 +66,18 @@ class Magnetometer(Component):
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
         self._failing = Failing(self._case_faults(), self._failing)
-        self._p = magnetometer.parameters(self.values)
+        self._take_noise()
         self._bias_b = magnetometer.draw_bias(self._p, self._key)
         self._delayed = Delayed(latency.parameters(self.values), self._key, latency.MAGNETOMETER)
-        self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._take_noise()
         self._failing.take(self._case_faults())
+
+    def _take_noise(self) -> None:
+        self._p = magnetometer.parameters(self.values)
+        self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
     def _case_faults(self) -> list[CaseFault]:
         return axis_faults.case_faults(self.values, "magnetometer", self._key)

@@ -79,6 +79,7 @@ class SlitSensor(Component):
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._timer = slit_timer.parameters(values)
         faults = slit_faults.case_faults(values, self._key)
         self._failing.take(faults)
         self._heads_in_flight.faults = faults
