@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
+from css_common.security import of_process
 from css_common.supervised import announced, duties
 
 _STOPPED = "T"
@@ -93,11 +94,12 @@ class Child:
         self.stream = self.log.open("wb" if self.process is None else "ab")
         source, beating = os.pipe()
         os.set_blocking(source, False)
+        environment = {**os.environ, **of_process(os.environ, self.name), **duties(beating, self.done)}
         try:
             # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
             self.process = subprocess.Popen(
                 self.command, stdout=self.stream, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                start_new_session=True, pass_fds=(beating,), env={**os.environ, **duties(beating, self.done)},
+                start_new_session=True, pass_fds=(beating,), env=environment,
             )  # fmt: skip
         except OSError:
             os.close(source)
