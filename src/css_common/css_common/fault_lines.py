@@ -253,7 +253,7 @@ def _node_of(target: str, hosts: Mapping[str, Host], where: str) -> tuple[str, s
     node, slash, rest = target.partition("/")
     if slash and node in hosts and rest.partition(".")[0] in hosts[node].units:
         return node, rest
-    if having and sort in NAMED_APART:
+    if having and sort in NAMED_APART and unit not in (ALL, ANY):
         names = [name for host in having for name in hosts[host].units[sort]]
         expected = ", ".join(f"{sort}.{name}" for name in names)
         raise ParameterError(f"{where}.target: {shown(target)} given, which does not fly; expected {expected}")

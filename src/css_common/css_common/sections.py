@@ -278,7 +278,7 @@ IO: Table = (
         ("exact", "latest"),
         "exact: inputs of one stamp belong together; latest: the newest of each, for devices with own clocks",
     ),
-    real("io.deadline", 0.5, "s", "age at which an input counts as silent", low=0.001, tunable=True),
+    real("io.deadline", 0.5, "s", "age at which an input counts as silent", low=0.001, high=1e9, tunable=True),
     text("io.body_frame", "bus", "frame_id of body-frame messages"),
     text("io.inertial_frame", "eci", "frame_id of inertial messages"),
     texts("io.accepted_frames", (), "further frame_ids taken for the expected one, as hardware drivers name them"),
@@ -290,7 +290,7 @@ IO: Table = (
         "graph: only the node that the mission names for a topic",
     ),
     LINK_FAULTS,
-    real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001),
+    real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001, high=1e9),
     flag("autostart", True, "configure and activate without being asked"),
 )
 
