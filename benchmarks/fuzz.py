@@ -22,6 +22,8 @@ import numpy as np
 from mutated_missions import STEPS, WORDS, first_not_finite, other_value
 from rclpy.parameter import Parameter as RosParameter
 
+from css_bringup.fly_mission import own_domain
+from css_bringup.options import console
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Input, Plant
 from css_common.edge import Edge
@@ -292,7 +294,8 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    trial = run(arguments.count, arguments.seed)
+    with own_domain(load_mission("cubesat_vmm"), None, None, console):
+        trial = run(arguments.count, arguments.seed)
     for failure in trial.failures[:50]:
         print(failure)
     print(json.dumps(dict(sorted(trial.counts.items()))))
