@@ -9,6 +9,7 @@ from flights import fly_composed, messages_by_topic
 from presence import present
 
 from css_analysis.flight_log import read_flight
+from css_analysis.spin_flight import read_spinning
 from css_bringup.commands import fly
 from css_bringup.composed import ComposedFlight
 from css_bringup.processes import fly_processes
@@ -16,7 +17,7 @@ from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_common import link_kinds
 from css_common.link import is_gap
-from css_common.mission import Mission, MissionError, mission_from_text
+from css_common.mission import Mission, MissionError, load_mission, mission_from_text
 from css_monte_carlo.direct_flight import fly_directly
 from css_monte_carlo.study import Configuration, run_study
 
@@ -212,3 +213,14 @@ def test_processes_die_hang_and_are_slow_at_their_time(tmp_path):
 def test_all_kinds_fly_here():
     said = ALL + "killed, frozen, slow"
     assert all(kind.name in said for kind in link_kinds.KINDS)
+
+
+def test_gaps_are_no_pulses_to_those_who_read_a_spinning_flight(tmp_path):
+    entry = "faults.a.target=message.slits/step"
+    lost = [entry, "faults.a.kind=dropped", "faults.a.share=0.2", "faults.a.time=2"]
+    mission = load_mission("esprit_2006", ["mission.duration=20", *lost])
+    result = fly_composed(mission, tmp_path / "bag")
+    assert result.failure == ""
+    assert len(gaps(tmp_path / "bag", "/slits/step")) > 100
+    flight = present(read_spinning(tmp_path / "bag"))
+    assert all(sample.frame_id == "bus" for sample in (*flight.attitudes, *flight.coning.values()))
