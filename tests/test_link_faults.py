@@ -175,6 +175,14 @@ def test_a_study_of_a_node_s_own_lines_is_refused_too(tmp_path):
         run_study(mission_from_text(text, "x.yaml"), [Configuration("ekf", True)], 2, tmp_path / "study")
 
 
+def test_an_event_that_sets_them_is_refused_too():
+    text = (HEAD % 2.0).replace(
+        "faults:", "events: {a: {time: 1.0, node: gyro, action: set, parameter: io.faults, value: [clock.gyro step 1]}}"
+    )
+    with pytest.raises(MissionError, match=r"events\.a: 'clock\.gyro step 1' flies on the graph alone"):
+        fly_directly(mission_from_text(text, "x.yaml"))
+
+
 def test_the_command_says_so_and_ends_with_2(tmp_path, capfd):
     path = tmp_path / "mission.yaml"
     path.write_text(HEAD % 2.0 + f"      one: {{time: 1.0, {NEEDS_A_GRAPH['process']}}}\n")

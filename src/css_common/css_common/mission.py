@@ -247,6 +247,9 @@ class Mission:
                 names = [entry.name for entry in self.faults if entry.line == line]
                 where = f"{SHARED}: {SECTION}{names[0]}" if names else f"{node.name}: {LINK_FAULTS.name}"
                 raise MissionError(f"{self.origin}: {where}: {shown(line)} {why}")
+        for event in self.events:
+            for line in of_sorts(event.value, *sorts) if event.parameter == LINK_FAULTS.name else ():
+                raise MissionError(f"{self.origin}: {SHARED}: events.{event.name}: {shown(line)} {why}")
 
     def with_overrides(self, overrides: Iterable[str]) -> "Mission":
         """The mission with `key=value` texts applied; a key may begin with a node's name (`ekf.use_gyro=false`).
