@@ -18,7 +18,7 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
 from css_common.vectors import Vec3, add, matmul, norm, scale
-from css_estimation.health.cell_expectation import HIDDEN, SEEN, contradiction, expected
+from css_estimation.health.cell_expectation import DOUBTFUL, HIDDEN, SEEN, contradiction, expected
 from css_estimation.health.cell_kinds import add_look, forget_sums, kind_of
 from css_estimation.health.cell_memory import (
     DIRECTIONS,
