@@ -67,6 +67,8 @@ class Link:
 
     Attributes:
         faults: of the case.
+        held: messages that are still on their way.
+        tells: somebody may hear of its faults.
         of_process: those of the process, each with its line; they are the host's affair, and only told here.
     """
 
@@ -80,8 +82,9 @@ class Link:
         self._component = component
         self._units = units
         self._done: frozenset[str] = frozenset()
+        self.tells = TOLD in component.frames
         self._teller = Teller()
-        self._held: list[_Held] = []
+        self.held: list[_Held] = []
         self.take()
 
     def forget(self, done: Iterable[str]) -> None:
@@ -104,16 +107,16 @@ class Link:
     @property
     def is_quiet(self) -> bool:
         """Messages pass as they are."""
-        return len(self.faults) == len(self.of_process) and not self._held
+        return len(self.faults) == len(self.of_process) and not self.held
 
     def memory(self) -> Any:
         """All that the coming messages hang on, for `recall`; messages are never changed."""
-        return list(self.faults), list(self.of_process), list(self._held), self._teller.memory()
+        return list(self.faults), list(self.of_process), list(self.held), self._teller.memory()
 
     def recall(self, memory: Any) -> None:
         """Goes back to a memory, which may be used again."""
         faults, of_process, held, told = memory
-        self.faults, self.of_process, self._held = list(faults), list(of_process), list(held)
+        self.faults, self.of_process, self.held = list(faults), list(of_process), list(held)
         self._teller.recall(told)
 
     def told(self, stamp_ns: int) -> dict[str, Sample]:
@@ -126,8 +129,8 @@ class Link:
             yield from messages
             return
         step = self._component.step_of(stamp_ns)
-        arriving = [held for held in self._held if held.due <= step]
-        self._held = [held for held in self._held if held.due > step]
+        arriving = [held for held in self.held if held.due <= step]
+        self.held = [held for held in self.held if held.due > step]
         yield from ((held.port, held.sample) for held in arriving if not held.after)
         topics = self._units.get("message", ())
         for port, sample in messages:
@@ -157,7 +160,7 @@ class Link:
             else:
                 if fault.kind != DROPPED:
                     due = step + (1 if fault.kind == REORDERED else round(fault.values[0]))
-                    self._held += (_Held(port, s, due, fault.kind == REORDERED) for s in sent)
+                    self.held += (_Held(port, s, due, fault.kind == REORDERED) for s in sent)
                 sent, whole = [], False
         yield from ((port, s) for s in sent)
         if not whole:
