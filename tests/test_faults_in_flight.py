@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults import every_kind
+from faults import FLOWN, every_kind
 from flights import fly_composed, messages_by_topic
 from listing import ROOT
 
@@ -16,14 +16,13 @@ from css_analysis.flight_log import read_flight
 from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_bringup.verbs.fly import conclude
+from css_common.case_faults import NEVER
 from css_common.codec import codec_of
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
 from css_common.preflight import preflight
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import fly_and_keep, fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
-from css_sim import fault_effects as effects
-from css_sim.fault_kinds import KINDS
 
 CASE = 4
 DURATION = 20.0
@@ -99,7 +98,7 @@ def test_the_estimator_gives_the_bytes_that_flew(flown, tmp_path):
 
 def test_each_fault_is_told_from_its_begin_to_its_end(mission, flown):
     log = read_flight(flown)
-    assert len(mission.faults) == len(KINDS)
+    assert len(mission.faults) == len(FLOWN)
     told = {(f.target, f.kind, round(f.begin_s, 6)): f for f in log.faults}
     for said in mission.faults:
         target, kind, *words = said.line.split()
@@ -141,7 +140,7 @@ def test_cases_of_a_study_draw_their_own_faults():
     flight = MissionFlight(mission)
     cases, _ = flight.cases(np.arange(40))
     rows = cases.faults[:, 0]
-    acting = rows["first_step"] < effects.NEVER
+    acting = rows["first_step"] < NEVER
     assert 8 < np.count_nonzero(acting) < 32
     assert set(rows["unit"][acting]) == {0, 1, 2, 3}
     assert np.all((rows["first_step"][acting] >= 10) & (rows["first_step"][acting] <= 60))

@@ -17,7 +17,9 @@ import numpy as np
 from css_analysis.fault_record import FaultRecord, fault_records
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Codec, DecodeError, Sample, codec_of, type_name
+from css_common.fault_lines import Units
 from css_common.kernel import kernel
+from css_common.link import is_gap
 from css_common.message_columns import Columns, stack
 from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
@@ -273,10 +275,23 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
     log = FlightLog(str(path), mission, notes=notes, imported=imported)
     for topic, (message_type, received) in messages.items():
         if topic not in told:
-            log.add(topic, message_type, _whole(topic, codec_of(message_type), received, notes).sorted())
+            log.add(topic, message_type, _whole(topic, codec_of(message_type), _came(received), notes).sorted())
     for topic in sorted(told):
-        log.faults += fault_records(_each_whole(topic, codec_of(Faults), messages[topic][1], notes), log.epoch_ns)
+        whole = _each_whole(topic, codec_of(Faults), messages[topic][1], notes)
+        log.faults += fault_records(whole, log.epoch_ns, _names_on(topic, mission))
     return log
+
+
+def _names_on(topic: str, mission: Mission | None) -> Units:
+    """Names of the units of the node that tells its faults on a topic, as far as the mission has it."""
+    nodes = () if mission is None else mission.nodes
+    return next((node.host.units for node in nodes if topic.startswith(f"/faults/{node.name}/")), {})
+
+
+def _came(received: list[bytes]) -> list[bytes]:
+    """Messages without those that say that there is none, and without second copies."""
+    pairs = zip(received, [b"", *received], strict=False)
+    return [data for data, before in pairs if data != before and not is_gap(data)]
 
 
 def _whole(topic: str, codec: Codec, received: list[bytes], notes: list[str]) -> Columns:

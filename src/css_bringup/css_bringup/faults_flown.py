@@ -8,6 +8,7 @@ from css_analysis.fault_record import fault_texts
 from css_analysis.flight_log import FlightLog
 from css_bringup.flight_changes import PARAMETER_EVENTS, read_setting
 from css_common.fault_lines import FAULTS
+from css_common.link_kinds import LINK_FAULTS
 from css_recording.bag_reader import BagReader
 
 
@@ -24,7 +25,9 @@ def _untold(log: FlightLog, bag: Path) -> Iterator[str]:
             return
         for message in reader.messages([PARAMETER_EVENTS]):
             setting = read_setting(message.data, message.stamp_ns)
-            if FAULTS.name in setting.values and f"/{FAULTS.name}/{setting.node}" not in topics:
-                lines = ", ".join(setting.values[FAULTS.name]) or "none any more"
-                about = (setting.stamp_ns - log.epoch_ns) / 1e9
-                yield f"{setting.node}: {lines}; set in flight at about {about:g} s"
+            told_on = f"/{FAULTS.name}/{setting.node}"
+            for name, topic in ((FAULTS.name, told_on), (LINK_FAULTS.name, f"{told_on}/link")):
+                if name in setting.values and topic not in topics:
+                    lines = ", ".join(setting.values[name]) or "none any more"
+                    about = (setting.stamp_ns - log.epoch_ns) / 1e9
+                    yield f"{setting.node}: {lines}; set in flight at about {about:g} s"

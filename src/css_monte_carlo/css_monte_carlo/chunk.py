@@ -14,6 +14,7 @@ import pyarrow as pa
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
 from css_monte_carlo.case_table import case_table
+from css_monte_carlo.drawn_faults import COLUMN, fault_column, has_faults
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.loop import Cases, Vehicle, fly_block
 from css_monte_carlo.measures import CaseTallies
@@ -56,7 +57,10 @@ def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
     else:
         tallies, _, cpu_s = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
     period_s = flight.mission.period_ns * 1e-9
-    return case_table(numbers, tallies, period_s, windows_of(flight.mission)), cpu_s
+    table = case_table(numbers, tallies, period_s, windows_of(flight.mission))
+    if has_faults(flight.mission):
+        table = table.append_column(COLUMN, fault_column(flight.mission, numbers))
+    return table, cpu_s
 
 
 @lru_cache(maxsize=2)

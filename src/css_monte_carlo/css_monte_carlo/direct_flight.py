@@ -14,6 +14,7 @@ from css_analysis.fault_record import fault_records
 from css_analysis.flight_log import LOGGED_TYPES, FlightLog
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
+from css_common.link_kinds import MESSAGES_FAIL, SORTS
 from css_common.message_columns import Columns
 from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
@@ -110,7 +111,17 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
     return {topic: wires[topic].samples for topic in kept}
 
 
+def refuse_what_needs_the_graph(mission: Mission) -> None:
+    """Refuses faults of messages, clocks and processes, which there are none of here.
+
+    Raises:
+        MissionError: the mission has one.
+    """
+    mission.refuse_faults(MESSAGES_FAIL, *SORTS)
+
+
 def _fly(mission: Mission, wires: "Wires") -> None:
+    refuse_what_needs_the_graph(mission)
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
     plant.stepper.apply_due(stamp_ns)

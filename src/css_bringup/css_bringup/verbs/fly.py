@@ -2,6 +2,7 @@
 """Flies a mission, and says what came of it."""
 
 import argparse
+import os
 
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
@@ -12,7 +13,9 @@ from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
 from css_bringup.options import complain, console, errors
+from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
 from css_recording.errors import BagError
@@ -24,7 +27,12 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
-    with own_domain(mission, arguments.domain, bag, console) as domain:
+    nodes = [*(node.name for node in mission.nodes), RECORDER]
+    enclaves = security.enclaves_of(nodes, arguments.processes)
+    with (
+        security.enforced(os.environ, arguments.security, enclaves),
+        own_domain(mission, arguments.domain, bag, console) as domain,
+    ):
         result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
     result.domain = domain
     return conclude(mission, result, as_json=arguments.json)

@@ -111,6 +111,7 @@ class CssArray(Component):
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._p = sun_cells.parameters(values)
         self._failing.take(cell_faults.case_faults(values, self._key))
         self._cells = self._cells._replace(faults=self._failing.table)
 
