@@ -185,6 +185,7 @@ class MissionFlight:
             speeds=np.zeros_like(momentum),
             rod_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             voltages=np.zeros((len(keys), len(nominal))),
+            healthy=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
             faults=self._faults([], numbers),
