@@ -20,6 +20,7 @@ from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
+from css_estimation.health import watched
 from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
@@ -214,8 +215,9 @@ class MissionFlight:
         """State and memory of the Sun estimator."""
         if self._heading is None:
             return None, None
-        algorithm, p = _algorithm(self._heading), _parameters(self._heading, self._heading.values)
-        return algorithm.initial_state(p), algorithm.initial_memory(p)
+        algorithm = _algorithm(self._heading)
+        p = watched.watched_parameters(algorithm, self._heading.values)
+        return watched.initial_state(algorithm, p), watched.initial_memory(algorithm, p)
 
     def _initial_attitude(self, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> tuple[Any, Any]:
         """State and memory of the attitude filter."""
@@ -250,7 +252,7 @@ class MissionFlight:
             attitude_hears_field=attitude_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),
             attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
-            heading=_parameters(self._heading, heading),
+            heading=None if heading is None else watched.watched_parameters(_algorithm(self._heading), heading),
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),

@@ -4,7 +4,8 @@
 A kernel that is handed to another as an argument cannot be cached on disk. The parameters of an estimator are a
 NamedTuple defined in its own module, so their type names the module whose `step` belongs to them, and the compiler
 settles the call when it compiles the loop for that type. None in the place of parameters is an estimator that a flight
-does not have: nothing is compiled for it.
+does not have: nothing is compiled for it. Those of an algorithm behind the health of its sensors are of
+`health.watched`, which calls the algorithm in turn.
 """
 
 import sys
@@ -35,6 +36,8 @@ def _overload_heading(p, state, memory, dt, voltages, aiding):
 def _heading_step(home):
     if home is None:
         return lambda p, state, memory, dt, voltages, aiding: (None, None)
+    if hasattr(home, "watched_heading"):
+        return home.watched_heading
     step = home.step
 
     def call(p, state, memory, dt, voltages, aiding):

@@ -44,6 +44,16 @@ def loop_of(algorithm: str) -> "Kernel":
     return kernel_of(_advance, algorithm)
 
 
+@cache
+def cycle_of(algorithm: str) -> "Kernel":
+    """One cycle of the `SunAlgorithm` of a module; arguments as of `estimate_heading`."""
+    return kernel_of(_cycle, algorithm)
+
+
+def _cycle(p: Any, state: Any, memory: Any, dt: float, voltages: Any, aiding: Aiding) -> Any:
+    return estimate_heading(p, state, memory, dt, voltages, aiding)
+
+
 def _advance(p: Any, state: Any, memory: Any, since_s, measured: Measured, sky, sky_light, out: Headings) -> Any:
     """The state after all cycles.
 

@@ -7,14 +7,17 @@ from typing import ClassVar
 import numpy as np
 
 from css_common.component import Component, Cycles, Input, Outgoing, Output, Received, Smoothing
+from css_common.declared import merged
 from css_common.kernel import typed_call
 from css_common.message_columns import Columns
-from css_common.schema import Values
+from css_common.schema import Table, Values
 from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
+from css_estimation.health import watched
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
 from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
+from css_estimation.sun.heading_loop import cycle_of
 from css_estimation.sun.low_pass import low_pass_gain
 from css_estimation.sun.mode_log import ModeLog
 from css_estimation.sun.sun_algorithm import SunAlgorithm
@@ -102,6 +105,10 @@ class SunEstimator(Component):
     mode_names: ClassVar[Mapping[int, str]] = {}
 
     @classmethod
+    def table(cls) -> Table:
+        return merged(super().table(), watched.PARAMETERS)
+
+    @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         return inputs_of(values)
 
@@ -128,27 +135,25 @@ class SunEstimator(Component):
         return Smoothing(rate=rate_gain(values), heading=1.0 if heading_gain is None else heading_gain(values))
 
     def configure(self) -> None:
-        self._parameters = self.algorithm.parameters(self.values)
-        self._state = self.algorithm.initial_state(self._parameters)
-        self._memory = self.algorithm.initial_memory(self._parameters)
-        self._step = typed_call(self.algorithm.step)
+        self._parameters = watched.watched_parameters(self.algorithm, self.values)
+        self._state = watched.initial_state(self.algorithm, self._parameters)
+        self._memory = watched.initial_memory(self.algorithm, self._parameters)
+        self._step = typed_call(cycle_of(self.algorithm.step.__module__))
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
         self._sky = flight_sky(self.values)
 
     def tune(self, values: Values) -> None:
         super().tune(values)
-        self._parameters = self.algorithm.parameters(values)
+        self._parameters = watched.watched_parameters(self.algorithm, values)
 
     def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
         # here, as no node in flight needs it
-        from css_estimation.sun.heading_dispatch import home_of
         from css_estimation.sun.heading_loop import loop_of, new_headings
         from css_estimation.sun.sky_table import sky_table
 
         measured = measured_in(steps)
-        # the loop finds `step` by the type of the parameters, which may be those of another module
-        if measured is None or getattr(home_of(self._parameters), "step", None) is not self.algorithm.step:
+        if measured is None:
             return None
         stamps = steps.stamps_ns
         before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns

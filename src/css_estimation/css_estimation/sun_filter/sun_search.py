@@ -9,27 +9,18 @@ estimate too, the only one while the spread is large; once it is small the filte
 import math
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, axes_across, dot, multiply, unit
+from css_common.vectors import Mat3, Vec3, multiply
+from css_estimation.sun.direction_grid import direction, mean_direction
 from css_estimation.sun_filter.cell_model import view_of
 from css_estimation.sun_filter.cell_update import READABLE
 from css_estimation.sun_filter.memory import DIRECTIONS
 from css_estimation.sun_filter.options import SunFilterParameters
 
-# Golden angle [rad]: points turned by it from one circle to the next are spread evenly (Fibonacci lattice).
-_GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
 _MEMORY = 1.0  # [s]
 _MARGIN = 0.07  # in cosines, half of the way from one direction to the next
 _SIGMA = 0.1  # error of an output that model and Earth leave
 _MOST = 12.0  # cost of a single cell, so that a broken one does not decide
 _LEAST_GAIN = 0.2
-
-
-@kernel
-def direction(g: int) -> Vec3:
-    """Direction `g` of `DIRECTIONS`."""
-    z = 1.0 - 2.0 * (g + 0.5) / DIRECTIONS
-    r, a = math.sqrt(1.0 - z * z), _GOLDEN * g
-    return r * math.cos(a), r * math.sin(a), z
 
 
 @kernel
@@ -65,34 +56,10 @@ def search(
     """
     kept = 1.0 if turns else math.exp(-dt / _MEMORY)
     share = dt / _MEMORY if turns else 1.0 - kept
-    best = -math.inf
     for g in range(DIRECTIONS):
-        grid[g] = kept * grid[g] - share * cost(p, voltages, flux, multiply(dcm_bn, direction(g)))
-        best = max(best, grid[g])
-    total = x = y = z = 0.0
-    for g in range(DIRECTIONS):
-        grid[g] -= best
-        weight = math.exp(grid[g])
-        d = direction(g)
-        total += weight
-        x += weight * d[0]
-        y += weight * d[1]
-        z += weight * d[2]
-    mean = unit((x, y, z))
-    first, second = axes_across(mean)
-    aa = ab = bb = 0.0
-    for g in range(DIRECTIONS):
-        weight = math.exp(grid[g]) / total
-        d = direction(g)
-        a, b = dot(d, first), dot(d, second)
-        across = math.sqrt(a * a + b * b)
-        if across > 0.0:
-            angle = math.atan2(across, dot(d, mean)) / across
-            a, b = a * angle, b * angle
-            aa += weight * a * a
-            ab += weight * a * b
-            bb += weight * b * b
-    return mean, 0.5 * (aa + bb) + math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
+        sun_b = multiply(dcm_bn, direction(g, DIRECTIONS))
+        grid[g] = kept * grid[g] - share * cost(p, voltages, flux, sun_b)
+    return mean_direction(grid)
 
 
 @kernel
@@ -100,5 +67,5 @@ def least_cost(p: SunFilterParameters, voltages, flux: float) -> float:
     """Cost of the direction that explains the outputs best."""
     least = math.inf
     for g in range(DIRECTIONS):
-        least = min(least, cost(p, voltages, flux, direction(g)))
+        least = min(least, cost(p, voltages, flux, direction(g, DIRECTIONS)))
     return least

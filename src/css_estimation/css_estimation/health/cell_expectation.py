@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a cell should read, if the Sun is where the cells together see it: an interval and its error.
+
+Reflected light adds what no model need know, from nothing to a bound. Near the edge of its view a cell may see the Sun
+or not. The error of an output is a share of it and a floor; that of the heading acts through the slope of the cosine.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.vectors import Vec3, dot
+from css_estimation.health.cell_options import CellHealthParameters
+from css_estimation.sun.cell_layout import cosine_on
+from css_estimation.symmetric import Symmetric, product
+
+_MOST = 25.0
+"""Bound on the squared sigmas of a single cell, so that no single look decides."""
+
+HIDDEN, DOUBTFUL, SEEN = 0, 1, 2
+
+
+class Expected(NamedTuple):
+    """Of one cell."""
+
+    low: float  # [-] without the Earth
+    high: float
+    variance: float  # [-]
+    sight: int  # HIDDEN, DOUBTFUL or SEEN: whether the Sun is in its view
+
+
+@kernel
+def _spread(normal_b: Vec3, cosine: float, covariance: Symmetric, heading: float) -> float:
+    """Variance of the cosine on a normal."""
+    return max(0.0, dot(normal_b, product(covariance, normal_b))) + heading * max(0.0, 1.0 - cosine * cosine)
+
+
+@kernel
+def expected(p: CellHealthParameters, i: int, sun_b: Vec3, covariance: Symmetric, light: float) -> Expected:
+    """Of cell `i` with the Sun in a unit direction.
+
+    Args:
+        covariance: of the direction [rad^2]; the lasting error of headings comes on top.
+        light: output at normal incidence [-].
+    """
+    cell = p.layout.cells[i]
+    cosine = cosine_on(p.layout, i, sun_b)
+    spread = _spread((cell.nx, cell.ny, cell.nz), cosine, covariance, p.heading)
+    margin = 3.0 * math.sqrt(spread)
+    inside = cosine - p.layout.cos_half_view
+    view = SEEN
+    if inside < -margin:
+        view = HIDDEN
+    elif inside < margin:
+        view = DOUBTFUL
+    if cell.side != 0.0 and view != HIDDEN:
+        clip = p.layout.clip_normal_b
+        component = dot(clip, sun_b)
+        room = 3.0 * math.sqrt(_spread(clip, component, covariance, p.heading))
+        above = component if cell.side > 0.0 else -component
+        if above < -room:
+            view = HIDDEN
+        elif above < room:
+            view = DOUBTFUL
+    if view == HIDDEN:
+        return Expected(0.0, 0.0, p.floor, view)
+    high = light * max(0.0, cosine)
+    low = high if view == SEEN else 0.0
+    return Expected(low, high, p.floor + p.share * high * high + light * light * spread, view)
+
+
+@kernel
+def contradiction(p: CellHealthParameters, e: Expected, output: float) -> float:
+    """Squared sigmas by which an output is outside of what is expected, with its sign, bounded."""
+    off = 0.0
+    if output > e.high + p.earth:
+        off = output - e.high - p.earth
+    elif output < e.low:
+        off = output - e.low
+    squared = min(off * off / e.variance, _MOST)
+    return squared if off > 0.0 else -squared
