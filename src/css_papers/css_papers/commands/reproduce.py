@@ -20,7 +20,10 @@ def _parser() -> CommandParser:
     parser = command_parser("css_papers", "reproduce", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("paper", metavar="PAPER", help=f"one of: {', '.join(paper_names())}")
     parser.add_argument(
-        "--cases", type=int, metavar="N", help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES}; faults: fewer)"
+        "--cases",
+        type=int,
+        metavar="N",
+        help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES}; faults: fewer)",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the page (default: reports/PAPER)")
     parser.add_argument("--quick", action="store_true", help="a first look: few cases, no side studies")

@@ -12,7 +12,7 @@ from css_common.mission import Mission
 from css_monte_carlo.coverage import Grid, grid_about, layout_of_mission, map_cells
 from css_papers.page import Section, Table
 
-_POLAR, _AZIMUTH = 60, 90
+_POLAR, _AZIMUTH = 60, 88  # none of its directions lies in a plane of two axes, where a cell is neither lit nor dark
 _POWER = math.radians(30.0)
 _SINGLE = 1  # cell in the Sun: a cone of directions, but no direction
 

@@ -37,7 +37,7 @@ class Fault(NamedTuple):
 
 NONE = Fault("no fault", "", (), quick=True)
 
-_CELL_KINDS = (
+_CELL_KINDS: tuple[tuple[str, str, Mapping[str, str]], ...] = (
     ("dead", "dead", {}),
     ("stuck at 0.5", "stuck", {"level": "0.5"}),
     ("stuck at 1.5", "stuck", {"level": "1.5"}),
@@ -58,7 +58,7 @@ _CELL_KINDS = (
 )
 _PROMPT = ("dead", "stuck", "wrap")
 _PAIRED = ("dead", "stuck at 0.5", "stuck at 1.5", "noisy, 0.3", "scaled by 0.5")
-_WHEEL_KINDS = (
+_WHEEL_KINDS: tuple[tuple[str, str, str, Mapping[str, str]], ...] = (
     ("wheel", "dead", "dead", {}),
     ("wheel", "with friction", "friction", {"coulomb": "0.003", "viscous": "1e-5"}),
     ("wheel", "scaled by 0.5", "scaled", {"factor": "0.5"}),
@@ -72,7 +72,7 @@ _WHEEL_KINDS = (
     ("tachometer", "off by 200 rpm", "bias", {"offset": "200"}),
     ("tachometer", "wrong sign", "sign", {}),
 )
-_ROD_KINDS = (
+_ROD_KINDS: tuple[tuple[str, str, Mapping[str, str]], ...] = (
     ("dead", "dead", {}),
     ("frozen", "frozen", {}),
     ("stuck", "stuck", {"level": "0.1"}),
@@ -80,7 +80,7 @@ _ROD_KINDS = (
     ("scaled by 0.5", "scaled", {"factor": "0.5"}),
     ("intermittent, half of 2 s", "intermittent", {"share": "0.5", "spell": "2"}),
 )
-_GYRO_KINDS = (
+_GYRO_KINDS: tuple[tuple[str, str, Mapping[str, str]], ...] = (
     ("off by 1 deg/s", "bias", {"offset": "1"}),
     ("off by 5 deg/s", "bias", {"offset": "5"}),
     ("dead", "dead", {}),
@@ -93,7 +93,7 @@ _GYRO_KINDS = (
     ("spikes of 3 deg/s in 0.1", "spikes", {"size": "3", "share": "0.1"}),
     ("intermittent, half of 2 s", "intermittent", {"share": "0.5", "spell": "2"}),
 )
-_FIELD_KINDS = (
+_FIELD_KINDS: tuple[tuple[str, str, Mapping[str, str]], ...] = (
     ("off by 10 uT", "bias", {"offset": "10000"}),
     ("dead", "dead", {}),
     ("stuck at 20 uT", "stuck", {"level": "20000"}),
@@ -135,7 +135,9 @@ def pairs() -> Iterator[Fault]:
 def wheel_faults() -> Iterator[Fault]:
     """Of one wheel or what measures its speed."""
     for sort, label, kind, values in _WHEEL_KINDS:
-        yield Fault(f"{sort} {label}", WHEEL, (_entry(f"{sort}.any", kind, values),), quick=(sort, label) == _QUICK_WHEEL)
+        yield Fault(
+            f"{sort} {label}", WHEEL, (_entry(f"{sort}.any", kind, values),), quick=(sort, label) == _QUICK_WHEEL
+        )
 
 
 _QUICK_WHEEL = ("wheel", "dead")
