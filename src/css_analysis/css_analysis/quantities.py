@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from css_analysis.flight_metrics import EstimatorMeasures, Windows
 from css_analysis import fault_sums
 from css_analysis.fault_sums import CELLS, RODS, SENSORS, WHEELS
+from css_analysis.flight_metrics import EstimatorMeasures, Windows
 
 
 class CaseSums(NamedTuple):
@@ -403,8 +403,8 @@ _FAULTS = (
     Quantity(
         "fault_shown_s",
         "s",
-        "time since the epoch at which the first fault shows: that of a cell when its reading is off by more than 5 sigma "
-        "of its noise, its drawn loss and 0.4 of the light of the Earth on it; that of other units when it begins",
+        "time since the epoch at which the first fault shows: that of a cell when its reading is off by more than "
+        "5 sigma of its noise, its drawn loss and 0.4 of the light of the Earth on it; that of other units when it begins",
         tally=lambda sums: fault_sums.shown_s(sums.health, sums.period_s),
     ),
     Quantity(

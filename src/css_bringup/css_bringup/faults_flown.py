@@ -3,17 +3,53 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from css_analysis.fault_record import fault_texts
 from css_analysis.flight_log import FlightLog
+from css_analysis.health_record import Detection, detections
 from css_bringup.flight_changes import PARAMETER_EVENTS, read_setting
 from css_common.fault_lines import FAULTS
 from css_recording.bag_reader import BagReader
 
 
-def faults_flown(log: FlightLog, bag: Path) -> list[str]:
-    """A line for each fault of a recorded flight."""
-    return [*fault_texts(log.faults), *_untold(log, bag)]
+class FaultsFlown(NamedTuple):
+    """What failed in a flight, and what was found of it."""
+
+    faults: list[str]  # a line for each fault
+    detections: list[Detection]
+
+    @property
+    def warnings(self) -> list[str]:
+        """A line for each unit that was held for failed and did not fail."""
+        return [
+            f"{found.health.node} held {found.health.target} for failed at {found.health.begin_s:g} s, on which no fault "
+            "acts"
+            for found in self.detections
+            if found.health is not None and found.is_false
+        ]
+
+    def objects(self) -> list[dict[str, Any]]:
+        """The detections as plain data."""
+        return [
+            {
+                **({} if found.health is None else found.health._asdict()),
+                "fault": None if found.fault is None else found.fault.text(),
+                "after_s": found.after_s,
+                "false": found.is_false,
+            }
+            for found in self.detections
+        ]
+
+
+NOTHING_FLOWN = FaultsFlown([], [])
+
+
+def faults_flown(log: FlightLog, bag: Path) -> FaultsFlown:
+    """The faults of a recorded flight."""
+    untold = list(_untold(log, bag))
+    truth_known = log.truth is not None and not log.imported and not untold
+    return FaultsFlown([*fault_texts(log.faults), *untold], detections(log.health, log.faults, truth_known))
 
 
 def _untold(log: FlightLog, bag: Path) -> Iterator[str]:

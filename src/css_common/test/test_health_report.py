@@ -9,7 +9,8 @@ from message_numbers import shared_numbers
 from css_common import health
 from css_common.component import Component
 from css_common.health import SORT_GYRO, SORT_WHEEL, Verdict, held_mask, hold, new_verdicts, release, verdicts_of
-from css_common.health_report import _EVIDENCE, HealthReport, health_output
+from css_common.health_report import HealthReport, health_output
+from css_common.health_words import EVIDENCE_WORDS
 from css_common.mission import load_mission
 from css_msgs.msg import Faults, Health
 
@@ -44,7 +45,7 @@ def test_numbers_are_those_of_the_messages(message, count):
 
 
 def test_each_evidence_has_its_words():
-    assert set(_EVIDENCE) == {getattr(Health, name) for name in dir(type(Health)) if name.startswith("EVIDENCE_")}
+    assert set(EVIDENCE_WORDS) == {getattr(Health, name) for name in dir(type(Health)) if name.startswith("EVIDENCE_")}
 
 
 def test_a_verdict_is_told_once_and_again_when_it_is_withdrawn(judge):

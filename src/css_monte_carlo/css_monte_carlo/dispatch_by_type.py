@@ -25,7 +25,7 @@ def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
 
 
 def command(p, state, dt, heading, speeds, field, torque_out, dipole_out):
-    """State after one cycle of a control law and `ActuatorsLeft`; without control, torques and dipoles stay as they are.
+    """State after one cycle of a control law, and `ActuatorsLeft`; without control, commands stay as they are.
 
     Args:
         heading: `SunHeading`.

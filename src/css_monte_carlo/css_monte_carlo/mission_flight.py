@@ -18,9 +18,9 @@ from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
+from css_estimation.health import watched
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
-from css_estimation.health import watched
 from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start

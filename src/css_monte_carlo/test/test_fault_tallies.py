@@ -133,7 +133,8 @@ def test_a_fault_shows_beyond_what_a_healthy_reading_is_uncertain_by(settings, a
 
 
 FAULTS = (
-    "css_array.faults=0 dead from 20,1 swapped 4 from 30 to 90,5 stuck 1.6 from 40,6 noisy 0.3 from 100,any frozen within 50",
+    "css_array.faults=0 dead from 20,1 swapped 4 from 30 to 90,5 stuck 1.6 from 40,6 noisy 0.3 from 100,"
+    "any frozen within 50",
     "dynamics.faults=wheel.1 dead from 50,rod.0 stuck 0.1 from 60,tachometer.2 bias 100 from 70",
     "gyro.faults=gyro.x bias 1 from 80",
     "magnetometer.faults=magnetometer.all dead from 90",

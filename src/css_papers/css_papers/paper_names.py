@@ -3,7 +3,6 @@
 
 from pathlib import Path
 
-
 CASES, QUICK_CASES = 1000, 40
 """Flights of each configuration, of papers that do not say otherwise."""
 

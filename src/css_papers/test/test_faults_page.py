@@ -132,7 +132,7 @@ def test_a_pair_is_two_cells():
 
 
 def test_what_two_of_six_faces_leave_is_known():
-    """Without the cells on +x and +y a quarter of the sky has one lit cell left; without those on +x and -x none has."""
+    """Without the cells on +x and +y a quarter of the sky has one lit cell left, without those on +x and -x none."""
     mission = load_mission("cubesat_3u_safe")
     (whole,) = sights(mission, 0)
     assert whole[1:] == (0.0, 0.0, 0.0, 0.0)

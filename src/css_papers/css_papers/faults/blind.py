@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What two failed cells take from a layout: the part of the sky from which the cells that are left do not see the Sun."""
+"""What two failed cells take from a layout: parts of the sky from which those that are left do not see the Sun."""
 
 import math
 from collections.abc import Iterator
@@ -12,7 +12,8 @@ from css_common.mission import Mission
 from css_monte_carlo.coverage import Grid, grid_about, layout_of_mission, map_cells
 from css_papers.page import Section, Table
 
-_POLAR, _AZIMUTH = 60, 88  # none of its directions lies in a plane of two axes, where a cell is neither lit nor dark
+# no direction lies in a plane of two axes, where cells on faces are neither lit nor dark
+_POLAR, _AZIMUTH = 60, 88
 _POWER = math.radians(30.0)
 _SINGLE = 1  # cell in the Sun: a cone of directions, but no direction
 
@@ -80,7 +81,7 @@ def _shares(sight: Sight) -> list[str]:
 
 
 _ARGUMENT = (
-    "Share of the sky, and of the directions within 30 deg of the array normal, from which no cell or only one of those "
-    "that are left sees the Sun. One cell gives a cone of directions, two give two directions: where these shares are "
+    "Share of the sky, and of the directions within 30 deg of the array normal, from which no cell or only one of "
+    "those that are left sees the Sun. One cell gives a cone of directions, two give two directions: where these shares are "
     "large in power, no flight can be asked to stay there by its cells alone, whatever it knows of them."
 )
