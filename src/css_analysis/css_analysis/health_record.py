@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The units that the nodes of a flight held for failed, as they told it on `health/NODE`, and whether they were right."""
+"""The units that nodes of a flight held for failed, as they told it on `health/NODE`, and whether they were right."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -42,8 +42,8 @@ class HealthRecord(NamedTuple):
         """One line for people."""
         until = "" if self.end_s is None else f", used again at {self.end_s:g} s"
         return (
-            f"{self.node}: {self.target} {self.kind}, at {self.begin_s:g} s: {self.evidence} ({self.statistic:.4g}, more "
-            f"than {self.threshold:.4g}, from {self.shown_s:g} s on); {self.done}{until}"
+            f"{self.node}: {self.target} {self.kind}, at {self.begin_s:g} s: {self.evidence} ({self.statistic:.4g}, "
+            f"more than {self.threshold:.4g}, from {self.shown_s:g} s on); {self.done}{until}"
         )
 
 
@@ -58,7 +58,7 @@ def health_records(node: str, told: Iterable[Sample], epoch_ns: int) -> list[Hea
             if key not in verdicts:
                 index = held.pop(key)
                 records[index] = records[index]._replace(end_s=now_s)
-        for key, (kind, evidence, *row) in verdicts.items():
+        for key, (kind, evidence, statistic, threshold, shown_s) in verdicts.items():
             word = KIND_WORDS.get(kind, f"kind {kind}")
             if key in held:
                 records[held[key]] = records[held[key]]._replace(kind=word)
@@ -66,7 +66,9 @@ def health_records(node: str, told: Iterable[Sample], epoch_ns: int) -> list[Hea
             held[key] = len(records)
             shows = EVIDENCE_WORDS.get(evidence, f"evidence {evidence}")
             done = DONE_WORDS.get(key[0], LEFT_OUT)
-            records.append(HealthRecord(node, unit_name(*key), word, shows, *row, now_s, None, done))
+            records.append(
+                HealthRecord(node, unit_name(*key), word, shows, statistic, threshold, shown_s, now_s, None, done)
+            )
     return records
 
 
@@ -115,8 +117,8 @@ def detections(
 ) -> list[Detection]:
     """Everything that was held for failed with what acted when it began, and the faults for which nothing was.
 
-    A fault of one axis of gyro or magnetometer is found by whoever leaves out the sensor, one of a tachometer by whoever
-    leaves out its wheel.
+    A fault of one axis of gyro or magnetometer is found by whoever leaves out the sensor, one of a tachometer by
+    whoever leaves out its wheel.
 
     Args:
         truth_known: whether `faults` are all that acted.

@@ -22,12 +22,8 @@ class FaultsFlown(NamedTuple):
     @property
     def warnings(self) -> list[str]:
         """A line for each unit that was held for failed and did not fail."""
-        return [
-            f"{found.health.node} held {found.health.target} for failed at {found.health.begin_s:g} s, on which no fault "
-            "acts"
-            for found in self.detections
-            if found.health is not None and found.is_false
-        ]
+        false = [found.health for found in self.detections if found.health is not None and found.is_false]
+        return [f"{h.node} held {h.target} for failed at {h.begin_s:g} s, on which no fault acts" for h in false]
 
     def objects(self) -> list[dict[str, Any]]:
         """The detections as plain data."""

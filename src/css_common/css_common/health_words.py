@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Words for the units that fail, for how they do and for what shows it: those of css_msgs/Faults and css_msgs/Health."""
+"""Words for units that fail, for how they do and for what shows it: those of css_msgs/Faults and css_msgs/Health."""
 
 from css_msgs.msg import Faults, Health
 

@@ -19,7 +19,7 @@ _SINGLE = 1  # cell in the Sun: a cone of directions, but no direction
 
 
 class Sight(NamedTuple):
-    """What the cells that are left see, in shares of the sky and of the directions within 30 deg of the array normal."""
+    """What the cells that are left see, in shares of the sky and of directions within 30 deg of the array normal."""
 
     cells: tuple[int, ...]  # that fail
     blind: float  # no cell sees the Sun
@@ -82,6 +82,6 @@ def _shares(sight: Sight) -> list[str]:
 
 _ARGUMENT = (
     "Share of the sky, and of the directions within 30 deg of the array normal, from which no cell or only one of "
-    "those that are left sees the Sun. One cell gives a cone of directions, two give two directions: where these shares are "
-    "large in power, no flight can be asked to stay there by its cells alone, whatever it knows of them."
+    "those that are left sees the Sun. One cell gives a cone of directions, two give two directions: where these "
+    "shares are large in power, no flight can be asked to stay there by its cells alone, whatever it knows of them."
 )
