@@ -62,6 +62,7 @@ def test_a_verdict_is_told_once_and_again_when_it_is_withdrawn(judge):
         [Health.EVIDENCE_RESPONSE],
     ]
     assert message.rows.tolist() == [12.5, 5.0, 3.0]
+    assert judge.left_out == ("wheel.2",)
     assert judge.lines == [
         "wheel.2 held for failed at 5 s, dead: it does not what it is commanded (12.5, more than 5, from 3 s on); "
         "wheel 2 is commanded nothing"
@@ -73,6 +74,7 @@ def test_a_verdict_is_told_once_and_again_when_it_is_withdrawn(judge):
     release(rows[2])
     message = report.told(judge, stamp(judge, 60), rows, 60)["health"]
     assert message.unit.tolist() == [] and message.rows.tolist() == []
+    assert judge.left_out == ()
     assert judge.lines[1:] == ["wheel.2 at 5.2 s: taken for friction, no longer for dead", "wheel.2 used again at 6 s"]
 
 

@@ -160,9 +160,7 @@ def _look(
         memory.used[i] = means[i] if _in_use(memory, i) else math.nan
     window = state.window
     noise = _NOISE if rate_known else _NOISE_WITHOUT_RATE
-    sun_b, covariance = propagate(
-        state.sun_b, state.covariance, scale(1.0 / max(window, 1e-9), state.turn_b), window, noise
-    )
+    sun_b, covariance = propagate(state.sun_b, state.covariance, scale(1.0 / max(window, 1e-9), state.turn_b), window, noise)
     frame = matmul(rotation_vector_to_dcm(state.turn_b), state.frame)
     phase, since, lost, light = state.phase, state.since, state.lost, state.light
     if window > _LONGEST:
@@ -175,9 +173,7 @@ def _look(
     if lit and not night:
         since += window
         if phase == PHASE_LOOKING:
-            phase, since, sun_b, covariance, frame = _find(
-                p, memory, means, since, sun_b, covariance, frame, light, rate_known
-            )
+            phase, since, sun_b, covariance, frame = _find(p, memory, means, since, sun_b, covariance, frame, light, rate_known)
         else:
             phase, since, lost, sun_b, covariance, light = _follow(
                 p, memory, means, phase, since, lost, sun_b, covariance, light, window, rate_known, state.step
