@@ -34,6 +34,12 @@ def undetected_units(sums: Any) -> np.ndarray:
     return np.count_nonzero((sums.shown_step >= 0) & (sums.found_step < 0), axis=(1, 2))
 
 
+def misnamed_units(sums: Any) -> np.ndarray:
+    """(C,) units that were isolated while a fault acted on them, and last taken for one of another class."""
+    known = (sums.found_step >= 0) & (sums.fault_kind >= 0)
+    return np.count_nonzero(known & (sums.fault_kind != sums.verdict_kind), axis=(1, 2))
+
+
 def isolated_units(sums: Any, *sorts: int) -> np.ndarray:
     """(C,) different units of some sorts that were ever isolated."""
     return np.bitwise_count(sums.sums["ever"][:, sorts]).sum(axis=1, dtype=np.int64)

@@ -25,6 +25,7 @@ class HealthRecord(NamedTuple):
         begin_s: first stamp at which the unit was held for failed [s].
         end_s: first stamp at which it was used again; None: it was not.
         done: what the node did about it.
+        names: when it was taken for what [s], a number of css_msgs/Faults or `KIND_UNKNOWN`.
     """
 
     node: str
@@ -37,6 +38,7 @@ class HealthRecord(NamedTuple):
     begin_s: float
     end_s: float | None
     done: str = LEFT_OUT
+    names: tuple[tuple[float, int], ...] = ()
 
     def text(self) -> str:
         """One line for people."""
@@ -61,13 +63,27 @@ def health_records(node: str, told: Iterable[Sample], epoch_ns: int) -> list[Hea
         for key, (kind, evidence, statistic, threshold, shown_s) in verdicts.items():
             word = KIND_WORDS.get(kind, f"kind {kind}")
             if key in held:
-                records[held[key]] = records[held[key]]._replace(kind=word)
+                known = records[held[key]]
+                if known.names[-1][1] != kind:
+                    records[held[key]] = known._replace(kind=word, names=(*known.names, (now_s, kind)))
                 continue
             held[key] = len(records)
             shows = EVIDENCE_WORDS.get(evidence, f"evidence {evidence}")
             done = DONE_WORDS.get(key[0], LEFT_OUT)
             records.append(
-                HealthRecord(node, unit_name(*key), word, shows, statistic, threshold, shown_s, now_s, None, done)
+                HealthRecord(
+                    node,
+                    unit_name(*key),
+                    word,
+                    shows,
+                    statistic,
+                    threshold,
+                    shown_s,
+                    now_s,
+                    None,
+                    done,
+                    ((now_s, kind),),
+                )
             )
     return records
 

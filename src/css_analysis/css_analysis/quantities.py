@@ -421,6 +421,12 @@ _FAULTS = (
         tally=lambda sums: fault_sums.undetected_units(sums.health),
         whole=True,
     ),
+    _counted(
+        "misnamed_units",
+        "failed cells that were isolated and last taken for what they are not; kinds that no reading tells apart are "
+        "one",
+        lambda sums: fault_sums.misnamed_units(sums.health),
+    ),
     _isolated("isolated_cells", "different cells that were ever isolated", CELLS),
     _isolated("isolated_actuators", "different wheels and torque rods that were ever isolated", WHEELS, RODS),
     _isolated("left_sensors", "gyro and magnetometer: how many of them were ever left out for failed", SENSORS),

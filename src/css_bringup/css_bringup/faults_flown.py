@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from css_analysis.fault_record import fault_texts
 from css_analysis.flight_log import FlightLog
-from css_analysis.health_record import Detection, detections
+from css_analysis.health_record import Detection, HealthRecord, detections
 from css_bringup.flight_changes import PARAMETER_EVENTS, read_setting
 from css_common.fault_lines import FAULTS
 from css_recording.bag_reader import BagReader
@@ -29,13 +29,17 @@ class FaultsFlown(NamedTuple):
         """The detections as plain data."""
         return [
             {
-                **({} if found.health is None else found.health._asdict()),
+                **({} if found.health is None else _plain(found.health)),
                 "fault": None if found.fault is None else found.fault.text(),
                 "after_s": found.after_s,
                 "false": found.is_false,
             }
             for found in self.detections
         ]
+
+
+def _plain(record: HealthRecord) -> dict[str, Any]:
+    return {name: value for name, value in record._asdict().items() if name != "names"}
 
 
 NOTHING_FLOWN = FaultsFlown([], [])

@@ -5,32 +5,46 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from css_analysis.fault_record import FaultRecord
 from css_analysis.flight_log import FlightLog
 from css_common.codec import Sample
 from css_common.fault_lines import FAULTS
 from css_common.kernel import typed_call
 from css_common.mission import Mission, Node
 from css_common.stepping import Stepper
-from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO
-from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells
+from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells, failing_units
+from css_monte_carlo.health_tallies import UNITS
 from css_sim import sun_cells
+from css_sim.fault_effects import FAULT, NEVER
+from css_sim.fault_kinds import AXES, KINDS, SORTS
 from css_sim.nodes.css_array import CssArray
 
-_LEFT = {"gyro": LEFT_GYRO, "magnetometer": LEFT_FIELD}
-_PLACES = {"wheel": "wheels", "tachometer": "wheels", "rod": "rods"}
+_CODES = {(kind.sort, kind.name): kind.code for kind in KINDS}
 _DRAWN = "random_faults."
 
 
-def failing_by_step(log: FlightLog) -> list[Failing]:
-    """The units that failed at each step of the truth of a flight, by the faults that its nodes told."""
-    truth = log.having("truth")
-    failing = [NOTHING_FAILS] * len(truth)
+def fault_table(log: FlightLog) -> np.ndarray:
+    """The faults (F,) of FAULT of a flight that its nodes told; of their values the first, as it was said."""
+    table = np.zeros(len(log.faults), FAULT)
+    known = 0
     for record in log.faults:
-        first = _step(record.begin_s, log.period)
-        end = len(truth) if record.end_s is None else _step(record.end_s, log.period)
-        for step in range(first, min(end, len(truth))):
-            failing[step] = _with(failing[step], record)
+        sort, _, unit = record.target.partition(".")
+        code = _CODES.get((sort, record.kind))
+        if code is None:
+            continue
+        row = table[known]
+        row["sort"], row["kind"] = SORTS[sort], code
+        row["unit"] = AXES.index(unit) if unit in AXES else int(unit)
+        row["value"] = next((value for value, _ in record.values.values()), 0.0)
+        row["first_step"] = _step(record.begin_s, log.period)
+        row["end_step"] = NEVER if record.end_s is None else _step(record.end_s, log.period)
+        known += 1
+    return table[:known]
+
+
+def failing_by_step(log: FlightLog, table: np.ndarray) -> list[Failing]:
+    """The units that faults (F,) of FAULT act on at each step of the truth of a flight."""
+    units = typed_call(failing_units)
+    failing = [units(table, step) if len(table) else NOTHING_FAILS for step in range(len(log.having("truth")))]
     if any(f.cells for f in failing):
         _note_evident(log, failing)
     return failing
@@ -38,19 +52,6 @@ def failing_by_step(log: FlightLog) -> list[Failing]:
 
 def _step(time_s: float, period_s: float) -> int:
     return round(time_s / period_s) if period_s > 0.0 else 0
-
-
-def _with(failing: Failing, record: FaultRecord) -> Failing:
-    sort, _, unit = record.target.partition(".")
-    if sort in _LEFT:
-        return failing._replace(sensors=failing.sensors | _LEFT[sort])
-    bits = 1 << int(unit)
-    if sort == "cell":
-        if record.kind == "swapped":
-            bits |= 1 << int(record.values["other"][0])
-        return failing._replace(cells=failing.cells | bits)
-    place = _PLACES.get(sort)
-    return failing if place is None else failing._replace(**{place: getattr(failing, place) | bits})
 
 
 def _note_evident(log: FlightLog, failing: list[Failing]) -> None:
@@ -95,3 +96,19 @@ def _healthy_cells(log: FlightLog, mission: Mission, array: Node) -> Iterator[tu
 
 def _is_fault(parameter: str) -> bool:
     return parameter == FAULTS.name or parameter.startswith(_DRAWN)
+
+
+def cell_kinds_by_step(log: FlightLog, node: str) -> Iterator[np.ndarray]:
+    """What an estimator takes each cell for at each step of the truth: (32,) rows with `kind`, as it told it."""
+    told = sorted(
+        (time_s, int(record.target.partition(".")[2]), kind)
+        for record in log.health
+        if record.node == node and record.target.startswith("cell.")
+        for time_s, kind in record.names
+    )
+    kinds = np.zeros(UNITS, [("kind", np.int64)])
+    for step in range(len(log.having("truth"))):
+        while told and _step(told[0][0], log.period) <= step:
+            _, cell, kind = told.pop(0)
+            kinds["kind"][cell] = kind
+        yield kinds

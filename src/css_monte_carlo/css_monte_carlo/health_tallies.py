@@ -52,12 +52,14 @@ class HealthTallies(NamedTuple):
     sums: np.ndarray  # (C, sorts) of HEALTH
     shown_step: np.ndarray  # (C, sorts, UNITS) first step at which the fault of a unit shows; -1: it never does
     found_step: np.ndarray  # (C, sorts, UNITS) first step at which a unit with a fault is isolated; -1: never
+    fault_kind: np.ndarray  # (C, sorts, UNITS) class of its kind when it was last isolated and failed; -1: not known
+    verdict_kind: np.ndarray  # (C, sorts, UNITS) class of what it was then taken for
 
 
 def new_health(cases: int) -> HealthTallies:
     """Nothing seen yet."""
     never = np.full((cases, SENSORS + 1, UNITS), -1)
-    return HealthTallies(np.zeros((cases, SENSORS + 1), HEALTH), never, never.copy())
+    return HealthTallies(np.zeros((cases, SENSORS + 1), HEALTH), never, never.copy(), never.copy(), never.copy())
 
 
 @kernel

@@ -18,9 +18,10 @@ from css_estimation.sun.sun_heading import Covariance, SunHeading
 from css_monte_carlo import attitude_tallies, case_tallies
 from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.case_tallies import Tallies, step_marks
-from css_monte_carlo.failing_of_log import failing_by_step
+from css_monte_carlo.failing_of_log import cell_kinds_by_step, failing_by_step, fault_table
 from css_monte_carlo.failing_units import NOTHING_FAILS
 from css_monte_carlo.health_tallies import NO_ACTUATORS_LEFT, ActuatorsLeft
+from css_monte_carlo.named_faults import note_cell_kinds
 from css_monte_carlo.step_truth import Truth
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
@@ -60,14 +61,20 @@ def tally_headings(tallies: Tallies, c: int, log: FlightLog, name: str, wheels: 
     momentum_b = _wheel_momentum(log, wheels)
     dipoles = _rod_dipoles(log)
     marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
-    failing, left = failing_by_step(log), _actuators_left(log)
-    count = typed_call(case_tallies.tally_step)
+    faults, left = fault_table(log), _actuators_left(log)
+    failing, kinds = failing_by_step(log, faults), cell_kinds_by_step(log, name)
+    read = _voltages_by_step(log)
+    count, note = typed_call(case_tallies.tally_step), typed_call(note_cell_kinds)
     for step, row in enumerate(rows):
         heading = _NO_HEADING if estimates is None or row < 0 else _heading(estimates, row)
         truth = _truth(
             log, step, log.having("truth").sigma_bn[step], momentum_b[step], np.zeros(3), dipoles[step]
         )._replace(failing=failing[step])
         count(tallies, c, step, int(marks[step]), truth, heading, None, None, left[step])
+        taken_for = next(kinds)
+        held = failing[step].cells & heading.isolated
+        if held and step in read:
+            note(tallies.health, c, held, taken_for, faults, step, read[step])
 
 
 def tally_attitudes(tallies: AttitudeTallies, c: int, log: FlightLog, name: str, gyro_bias_b: np.ndarray) -> None:
@@ -119,6 +126,14 @@ def _rod_dipoles(log: FlightLog) -> list[float]:
         rows, steps = log.truth_rows(log.rod_command)
         dipoles[steps] = np.sum(np.abs(log.rod_command.dipole[rows]), axis=1)
     return dipoles.tolist()
+
+
+def _voltages_by_step(log: FlightLog) -> dict[int, np.ndarray]:
+    """What the cells read at each step of the truth that has it."""
+    if log.voltages is None:
+        return {}
+    rows, steps = log.truth_rows(log.voltages)
+    return {step: log.voltages.voltages[row] for step, row in zip(steps.tolist(), rows.tolist(), strict=True)}
 
 
 def _actuators_left(log: FlightLog) -> list[ActuatorsLeft]:

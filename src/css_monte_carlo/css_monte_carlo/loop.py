@@ -21,6 +21,7 @@ from css_estimation.sun.sky_table import sky_at
 from css_estimation.sun.sun_heading import Aiding
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, note_estimate, tally
 from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells, failing_units
+from css_monte_carlo.named_faults import note_kinds
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
@@ -196,6 +197,8 @@ def fly_block(
                 failing,
             )
             tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory, left)
+            if faults.shape[0] > 0:
+                note_kinds(tallies, c, heading, state.heading_memory, failing.cells, faults, step, voltages)
             if trace.shape[0] > 0:
                 _note(trace[c, step], rotation, dipole, torque, speeds)
                 note_estimate(tallies, heading, attitude, trace[c, step, TRUTH_COLUMNS:])

@@ -72,7 +72,7 @@ def test_a_pyramid_that_lacks_a_cell_is_not_used():
 
 
 def columns(**given):
-    usual = {name: np.zeros(3) for name in (*FALSE, "converging_s")}
+    usual = {name: np.zeros(3) for name in (*FALSE, "converging_s", "misnamed_units")}
     usual |= {
         name: np.full(3, np.nan) for name in ("fault_shown_s", "detected_s", "nis_mean", "heading_error_mean_deg")
     }
@@ -111,8 +111,12 @@ def test_found_is_asked_of_the_cases_in_which_a_fault_shows():
     )
     found = outcome(of, columns(), ALL, {}, ONES)
     assert (found.shown, found.detected, found.promptly) == (2, 1.0, 0.5)
+    assert found.named == 1.0
     assert found.detected_median == 7.0 and found.detected_p95 == pytest.approx(10.6)
     assert found.false == 4 and found.power == pytest.approx(2.0 / 3.0)
+    wrong = columns(fault_shown_s=[5.0] * 3, detected_s=[3.0, 3.0, np.nan], misnamed_units=[1, 0, 1])
+    assert outcome(wrong, columns(), ALL, {}, ONES).named == 0.5
+    assert outcome(wrong, columns(), ALL, {}, [frozenset()] * 3).named is None
     missed = outcome(columns(fault_shown_s=[5.0, 5.0, 5.0], detected_s=[3.0, np.nan, np.nan]), columns(), ALL, {}, ONES)
     assert missed.detected == pytest.approx(1.0 / 3.0) and missed.promptly == pytest.approx(1.0 / 3.0)
 

@@ -36,6 +36,7 @@ class Outcome(NamedTuple):
     promptly: float | None  # the same within `PROMPTLY_S`
     detected_median: float | None  # [s] over the cases in which all were
     detected_p95: float | None
+    named: float | None  # share of those in which what was isolated was taken for what it is
     false: int  # isolations of units that did not fail, in all cases
     nis: float | None
 
@@ -94,6 +95,7 @@ def outcome(
         promptly=_share(time <= PROMPTLY_S, shown),
         detected_median=float(np.median(time[found])) if found.any() else None,
         detected_p95=float(np.percentile(time[found], 95.0)) if found.any() else None,
+        named=_share(of("misnamed_units")[counted] == 0, found) if any(failed) else None,
         false=int(false),
         nis=_mean(of("nis_mean")[counted]),
     )
