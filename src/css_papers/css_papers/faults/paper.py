@@ -51,8 +51,8 @@ _DEFINITIONS = (
     "the light of the Earth on it); other units from when they fail",
     "found: of the cases in which a fault shows, those in which all that show are isolated; times from when it shows",
     "named rightly: of those found, the cases in which every cell was last taken for what it is; one class are: dead "
-    "and stuck at zero, frozen there or with the wrong sign before a converter without negative readings; stuck, frozen "
-    "and at the high end; scaled, shadowed and saturated; noisy and spikes",
+    "and stuck at zero, frozen there or with the wrong sign before a converter without negative readings; stuck, "
+    "frozen and at the high end; scaled, shadowed and saturated; noisy and spikes",
     "false: isolations of units that did not fail, in all cases together",
 )
 
