@@ -44,7 +44,7 @@ def _columns_of(runs: Sequence[Run]) -> list[Quantity]:
 def isolated_lines(runs: Iterable[Run]) -> list[str]:
     """A line for each run that left out cells for failed."""
     return [
-        f"{run['estimator']} left out {'cell' if len(run['isolated_cells']) == 1 else 'cells'} "
+        f"{run['estimator']}{' (flown)' if run['flown'] else ''} left out {'cell' if len(run['isolated_cells']) == 1 else 'cells'} "
         f"{', '.join(map(str, run['isolated_cells']))} for failed, for some time or all"
         for run in runs
         if run.get("isolated_cells")

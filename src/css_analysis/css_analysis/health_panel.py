@@ -13,6 +13,8 @@ from css_common.message_columns import Columns
 from css_msgs.msg import SunEstimate
 
 _SORTS = ("cell", "wheel", "rod", "gyro", "magnetometer", "tachometer")
+CONTROL = "control"
+"""Who leaves out actuators, in the absence of a name."""
 _FAULT_HEIGHT, _HELD_HEIGHT = 0.8, 0.3
 
 
@@ -22,18 +24,22 @@ class Spell(NamedTuple):
     target: str  # such as `cell.3`, or `gyro` as a whole
     by: str  # who held it for failed; empty: it failed
     begin_s: float
-    end_s: float
+    end_s: float | None  # None: to the end of the flight
 
 
-def spells(log: FlightLog, end_s: float) -> list[Spell]:
-    """Of all units of a flight that ends at a time [s] after the epoch."""
-    failed = [Spell(f.target, "", f.begin_s, end_s if f.end_s is None else f.end_s) for f in log.faults]
-    held = [
+def spells(log: FlightLog) -> list[Spell]:
+    """Of all units of a flight."""
+    failed = [Spell(f.target, "", f.begin_s, f.end_s) for f in log.faults]
+    return failed + held_spells(log)
+
+
+def held_spells(log: FlightLog) -> list[Spell]:
+    """The times in which estimators and control left out units, by what they published."""
+    return [
         Spell(target, name, begin_s, until_s)
         for name, target, columns, on in _masks(log)
         for begin_s, until_s in _runs(log.time(columns), on)
     ]
-    return failed + held
 
 
 def _masks(log: FlightLog) -> Iterator[tuple[str, str, Columns, np.ndarray]]:
@@ -45,8 +51,8 @@ def _masks(log: FlightLog) -> Iterator[tuple[str, str, Columns, np.ndarray]]:
             if on.any():
                 yield name, target, columns, on
     if log.control is not None:
-        yield from _bits("control", "wheel", log.control, log.control.wheels_isolated)
-        yield from _bits("control", "rod", log.control, log.control.rods_isolated)
+        yield from _bits(CONTROL, "wheel", log.control, log.control.wheels_isolated)
+        yield from _bits(CONTROL, "rod", log.control, log.control.rods_isolated)
 
 
 def _bits(name: str, sort: str, columns: Columns, masks: np.ndarray) -> Iterator[tuple[str, str, Columns, np.ndarray]]:
@@ -56,11 +62,11 @@ def _bits(name: str, sort: str, columns: Columns, masks: np.ndarray) -> Iterator
             yield name, f"{sort}.{i}", columns, (masks >> np.uint32(i) & 1) != 0
 
 
-def _runs(time_s: np.ndarray, on: np.ndarray) -> Iterator[tuple[float, float]]:
+def _runs(time_s: np.ndarray, on: np.ndarray) -> Iterator[tuple[float, float | None]]:
     """Begin and end [s] of each stretch of messages with a unit held for failed."""
     turns = np.flatnonzero(np.diff(np.concatenate(([0], on.astype(int), [0]))))
     for first, after in zip(turns[::2], turns[1::2], strict=True):
-        yield float(time_s[first]), float(time_s[min(after, len(time_s) - 1)])
+        yield float(time_s[first]), float(time_s[after]) if after < len(time_s) else None
 
 
 def has_spells(log: FlightLog) -> bool:
@@ -75,7 +81,7 @@ def draw_health(axes: Axes, log: FlightLog, scale: float, last: float) -> None:
         scale: [s] of one unit of the abscissa.
         last: end of the flight, in that unit.
     """
-    found = spells(log, last * scale)
+    found = spells(log)
     targets = sorted({spell.target for spell in found}, key=_rank)
     judges = sorted({spell.by for spell in found if spell.by})
     shades = dict(zip(judges, colours(len(judges)), strict=True))
@@ -83,7 +89,9 @@ def draw_health(axes: Axes, log: FlightLog, scale: float, last: float) -> None:
     labelled: set[str] = set()
     for spell in found:
         at = len(targets) - 1 - targets.index(spell.target)
-        bar = [(spell.begin_s / scale, (spell.end_s - spell.begin_s) / scale)]
+        begin = spell.begin_s / scale
+        end = last if spell.end_s is None else spell.end_s / scale
+        bar = [(begin, end - begin)]
         label = spell.by or "fails"
         shown = "_" + label if label in labelled else label
         labelled.add(label)

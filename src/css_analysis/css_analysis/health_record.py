@@ -20,8 +20,8 @@ class HealthRecord(NamedTuple):
         target: the unit, such as `cell.3`.
         kind: what it was last taken for, in words.
         evidence: what showed it, in words.
-        statistic, threshold: of that evidence.
-        shown_s: when the statistic was first beyond its threshold [s] after the epoch.
+        statistic, threshold: of that evidence; None: nobody told.
+        shown_s: when the statistic was first beyond its threshold [s] after the epoch; None: nobody told.
         begin_s: first stamp at which the unit was held for failed [s].
         end_s: first stamp at which it was used again; None: it was not.
         done: what the node did about it.
@@ -32,9 +32,9 @@ class HealthRecord(NamedTuple):
     target: str
     kind: str
     evidence: str
-    statistic: float
-    threshold: float
-    shown_s: float
+    statistic: float | None
+    threshold: float | None
+    shown_s: float | None
     begin_s: float
     end_s: float | None
     done: str = LEFT_OUT
@@ -43,10 +43,11 @@ class HealthRecord(NamedTuple):
     def text(self) -> str:
         """One line for people."""
         until = "" if self.end_s is None else f", used again at {self.end_s:g} s"
-        return (
-            f"{self.node}: {self.target} {self.kind}, at {self.begin_s:g} s: {self.evidence} ({self.statistic:.4g}, "
-            f"more than {self.threshold:.4g}, from {self.shown_s:g} s on); {self.done}{until}"
-        )
+        beyond = ""
+        if self.statistic is not None:
+            beyond = f" ({self.statistic:.4g}, more than {self.threshold:.4g}, from {self.shown_s:g} s on)"
+        found = f"{self.node}: {self.target} {self.kind}, at {self.begin_s:g} s: {self.evidence}{beyond}"
+        return f"{found}; {self.done}{until}"
 
 
 def health_records(node: str, told: Iterable[Sample], epoch_ns: int) -> list[HealthRecord]:
@@ -93,6 +94,11 @@ def _verdicts_of(message: Sample) -> Iterator[tuple]:
     rows = message.rows[: len(message.rows) // 3 * 3].reshape(-1, 3).tolist()
     for name, row in zip(names, rows, strict=False):
         yield (*name, *row)
+
+
+def untold_record(node: str, target: str, begin_s: float, end_s: float | None) -> HealthRecord:
+    """Of a unit that a node left out without telling why."""
+    return HealthRecord(node, target, "failed", "nobody tells why", None, None, None, begin_s, end_s)
 
 
 class Detection(NamedTuple):

@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from css_analysis.fault_record import fault_texts
 from css_analysis.flight_log import FlightLog
-from css_analysis.health_record import Detection, HealthRecord, detections
+from css_analysis.health_panel import CONTROL, held_spells
+from css_analysis.health_record import Detection, HealthRecord, detections, untold_record
 from css_bringup.flight_changes import PARAMETER_EVENTS, read_setting
 from css_common.fault_lines import FAULTS
 from css_recording.bag_reader import BagReader
@@ -49,7 +50,16 @@ def faults_flown(log: FlightLog, bag: Path) -> FaultsFlown:
     """The faults of a recorded flight."""
     untold = list(_untold(log, bag))
     truth_known = log.truth is not None and not log.imported and not untold
-    return FaultsFlown([*fault_texts(log.faults), *untold], detections(log.health, log.faults, truth_known))
+    held = [*log.health, *_held_untold(log)]
+    return FaultsFlown([*fault_texts(log.faults), *untold], detections(held, log.faults, truth_known))
+
+
+def _held_untold(log: FlightLog) -> Iterator[HealthRecord]:
+    """What was left out by nodes that tell no reasons."""
+    tell = {record.node for record in log.health}
+    for spell in held_spells(log):
+        if spell.by not in tell and not (spell.by == CONTROL and tell - log.estimates.keys()):
+            yield untold_record(spell.by, spell.target, spell.begin_s, spell.end_s)
 
 
 def _untold(log: FlightLog, bag: Path) -> Iterator[str]:

@@ -25,7 +25,7 @@ def numbers(*values):
     return np.array(values, np.uint32)
 
 
-def bag_of(folder, acting, held, with_truth=True):
+def bag_of(folder, acting, held, with_truth=True, told_why=True):
     """A recording of 20 s: faults (cell, level) from 5 s on, cells held for failed from 8 s on."""
     pointing = np.full(STEPS, 10.0)
     said = estimates(tilted(pointing), isolated=np.where(np.arange(STEPS) >= 80, sum(1 << i for i in held), 0))
@@ -54,6 +54,8 @@ def bag_of(folder, acting, held, with_truth=True):
             ),
         ),
     }
+    if not told_why:
+        del told["/health/ekf"]
     kinds = {name: kind for name, (kind, *_) in (series | told).items()}
     mission = load_mission("okeefe_2013", ["mission.duration=20"])
     with BagWriter(
@@ -114,3 +116,10 @@ def test_without_truth_nobody_says_that_it_is_false(tmp_path):
     flown = faults_flown(read_flight(bag), bag)
     assert [found.text() for found in flown.detections] == [f"ekf: cell.5 stuck, at 8 s: {EVIDENCE}"]
     assert flown.warnings == []
+
+
+def test_what_is_left_out_without_a_reason_is_told_all_the_same(tmp_path):
+    bag = bag_of(tmp_path / "bag", [3], [3], told_why=False)
+    (found,) = faults_flown(read_flight(bag), bag).detections
+    text = "ekf: cell.3 failed, at 8 s: nobody tells why; left out; it is stuck: detected after 3 s"
+    assert found.text() == text
