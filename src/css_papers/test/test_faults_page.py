@@ -121,6 +121,11 @@ def test_found_is_asked_of_the_cases_in_which_a_fault_shows():
     assert missed.detected == pytest.approx(1.0 / 3.0) and missed.promptly == pytest.approx(1.0 / 3.0)
 
 
+def test_a_line_without_cases_has_no_numbers():
+    found = outcome(columns(), columns(), np.zeros(3, bool), {}, ONES)
+    assert (found.cases, found.power, found.later_median, found.later_max, found.named) == (0, None, None, None, None)
+
+
 def test_a_pair_is_two_cells():
     subject = BY_LABEL["wavg"]
     mission, pair = subject.loaded(quick=True), next(pairs())

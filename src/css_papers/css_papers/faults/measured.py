@@ -27,9 +27,9 @@ class Outcome(NamedTuple):
     """One line of the page; None: there is no such number."""
 
     cases: int
-    power: float  # share of the cases that end in power
-    later_median: float  # [s] more sunlight beyond 30 deg of the array normal than without the fault
-    later_max: float  # infinite: some case never came within
+    power: float | None  # share of the cases that end in power
+    later_median: float | None  # [s] more sunlight beyond 30 deg of the array normal than without the fault
+    later_max: float | None  # infinite: some case never came within
     ratio: float | None  # mean heading error over that of the mission without the cell
     shown: int  # cases in which a fault showed
     detected: float | None  # share of them in which all that showed were isolated while they acted
@@ -86,9 +86,9 @@ def outcome(
     false = sum(of(name)[counted].sum() for name in FALSE)
     return Outcome(
         cases=int(counted.sum()),
-        power=float(np.mean(np.isfinite(of("power_positive_from_s")[counted]))),
-        later_median=float(np.median(later)),
-        later_max=float(np.max(later)),
+        power=_mean(np.isfinite(of("power_positive_from_s")[counted]).astype(float)),
+        later_median=float(np.median(later)) if len(later) else None,
+        later_max=float(np.max(later)) if len(later) else None,
         ratio=_ratio(of("heading_error_mean_deg"), counted, lacking, failed),
         shown=int(shown.sum()),
         detected=_share(found, shown),

@@ -148,7 +148,7 @@ def rows_of(flown: Flown) -> Iterator[Row]:
         single = fault.sort not in (PAIR, BOARD)
         power = _ALMOST_ALL if fault.sort == PAIR else _ALL if single else None
         yield row(f"{label}: in power", "-", None, found.power, power, variant=variant)
-        later = found.later_max if math.isfinite(found.later_max) else None
+        later = found.later_max if found.later_max is not None and math.isfinite(found.later_max) else None
         yield row(f"{label}: later, most", "s", None, later, _LATER if single else None, variant=variant)
         if fault.sort == CELL:
             yield row(f"{label}: error / without the cell", "-", None, found.ratio, _RATIO, variant=variant)
@@ -177,14 +177,12 @@ def _about(flown: Flown) -> str:
 
 def _lines(flown: Flown) -> Iterator[list[str]]:
     for fault, found in flown.outcomes.items():
-        later_max = number(found.later_max) if math.isfinite(found.later_max) else "never"
-        later_median = number(found.later_median) if math.isfinite(found.later_median) else "never"
         of_fault = ["", "", "", "", ""] if fault is NONE else _found(found)
-        later = ["", ""] if fault is NONE else [later_median, later_max]
+        later = ["", ""] if fault is NONE else [_time(found.later_median), _time(found.later_max)]
         yield [
             fault.label,
             str(found.cases),
-            f"{100.0 * found.power:.1f} %",
+            _percent(found.power),
             *later,
             "" if found.ratio is None else number(found.ratio),
             *of_fault,
@@ -194,5 +192,13 @@ def _lines(flown: Flown) -> Iterator[list[str]]:
 
 
 def _found(found: Outcome) -> list[str]:
-    share, named = ("-" if part is None else f"{100.0 * part:.1f} %" for part in (found.detected, found.named))
-    return [str(found.shown), share, number(found.detected_median), number(found.detected_p95), named]
+    times = [number(found.detected_median), number(found.detected_p95)]
+    return [str(found.shown), _percent(found.detected), *times, _percent(found.named)]
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else f"{100.0 * share:.1f} %"
+
+
+def _time(time_s: float | None) -> str:
+    return "never" if time_s is not None and math.isinf(time_s) else number(time_s)
