@@ -11,7 +11,7 @@ from css_common.kernel import typed_call
 from css_common.mission import load_mission
 from css_estimation.sun import pyramid_switch
 from css_papers.faults import paper
-from css_papers.faults.blind import sights
+from css_papers.faults.blind import DIM, sights
 from css_papers.faults.kinds import CELL, NONE, PAIR, cell_faults, gyro_faults, pairs, rod_faults, wheel_faults
 from css_papers.faults.measured import FALSE, counted_cases, failed_cells, outcome
 from css_papers.faults.missions import absent, absents, subjects
@@ -35,7 +35,7 @@ def test_every_kind_of_cell_wheel_rod_and_gyro_is_flown():
     flown = {(e.target.partition(".")[0], e.kind) for f in cell_faults() for e in f.entries}
     flown |= {
         (e.target.partition(".")[0], e.kind)
-        for g in (wheel_faults, rod_faults, gyro_faults)
+        for g in (wheel_faults, lambda: rod_faults(0.1), gyro_faults)
         for f in g()
         for e in f.entries
     }
@@ -143,15 +143,38 @@ def test_a_pair_is_two_cells():
 def test_what_two_of_six_faces_leave_is_known():
     """Without the cells on +x and +y a quarter of the sky has one lit cell left, without those on +x and -x none."""
     mission = load_mission("cubesat_3u_safe")
-    (whole,) = sights(mission, 0)
+    (whole,) = sights(mission, 0, dim=0.0)
     assert whole[1:] == (0.0, 0.0, 0.0, 0.0)
-    by_cells = {sight.cells: sight for sight in sights(mission, 2)}
+    by_cells = {sight.cells: sight for sight in sights(mission, 2, dim=0.0)}
     assert len(by_cells) == 15
     beside, opposite = by_cells[0, 2], by_cells[0, 1]
     assert beside.blind == 0.0 and beside.cone == pytest.approx(0.25, abs=0.01)
     assert (opposite.blind, opposite.cone) == (0.0, 0.0)
     # about +x, half of the directions near it have y above zero
     assert beside.cone_in_power == pytest.approx(0.5, abs=0.01)
+
+
+def test_a_cell_that_reads_no_more_than_the_earth_gives_sees_no_sun():
+    """About each axis of six faces is a square pyramid of directions that are below DIM on both other axes."""
+    (whole,) = sights(load_mission("cubesat_3u_safe"), 0)
+    directions = np.random.default_rng(1).normal(size=(200_000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    lit = np.count_nonzero(np.abs(directions) >= DIM, axis=1)
+    assert whole.blind == 0.0 and whole.cone == pytest.approx(np.mean(lit == 1), abs=0.004)
+    assert not whole.keeps_power
+
+
+def test_pairs_that_leave_the_sun_in_sight_in_power():
+    """Of the eight cells of the paper, four see the Sun about the array normal, and any two of the others may fail."""
+    pairs_left = {sight.cells for sight in sights(load_mission("okeefe_2013"), 2) if sight.keeps_power}
+    assert {(4, 5), (4, 6), (6, 7)} <= pairs_left and not {(0, 1), (0, 2), (2, 3)} & pairs_left
+
+
+def test_power_is_told_apart_where_enough_cells_are_left():
+    of = columns(power_positive_from_s=[1.0, np.nan, 1.0])
+    found = outcome(of, columns(), ALL, {}, ONES, [frozenset([0])])
+    assert found.power == pytest.approx(2.0 / 3.0) and found.power_seen == 1.0
+    assert outcome(of, columns(), ALL, {}, ONES).power_seen is None
 
 
 def test_a_short_flight_gives_a_page(tmp_path, monkeypatch):
@@ -166,7 +189,7 @@ def test_a_short_flight_gives_a_page(tmp_path, monkeypatch):
     text = (tmp_path / "README.md").read_text(encoding="utf-8")
     for fault in chosen[0].faults(quick=True):
         assert f"| {fault.label} " in text
-    assert "What two failed cells leave to be seen" in text
+    assert "What two failed cells leave to be seen" in text and "## What is missed" in text
 
 
 def test_the_page_flies_fewer_cases_than_papers_do():

@@ -15,6 +15,8 @@ from css_papers.page import Section, Table
 # no direction lies in a plane of two axes, where cells on faces are neither lit nor dark
 _POLAR, _AZIMUTH = 60, 88
 _POWER = math.radians(30.0)
+DIM = 0.2
+"""Output [-] of a cell that looks at nothing but the Earth, where it is bright: no less tells of the Sun."""
 _SINGLE = 1  # cell in the Sun: a cone of directions, but no direction
 
 
@@ -27,10 +29,16 @@ class Sight(NamedTuple):
     blind_in_power: float
     cone_in_power: float
 
+    @property
+    def keeps_power(self) -> bool:
+        """Whether two cells or more see the Sun from all directions within 30 deg of the array normal."""
+        return self.blind_in_power == self.cone_in_power == 0.0
 
-def sights(mission: Mission, failing: int) -> list[Sight]:
-    """Of each set of so many cells."""
+
+def sights(mission: Mission, failing: int, dim: float = DIM) -> list[Sight]:
+    """Of each set of so many cells, of which those count that read more than `dim` in the light of the Sun."""
     layout, grid = layout_of_mission(mission), _grid(mission)
+    layout = layout._replace(chain=layout.chain._replace(dropout=dim))
     count = len(layout.cells)
     return [_sight(layout, grid, cells) for cells in combinations(range(count), failing)]
 
@@ -66,7 +74,7 @@ def blind_section(missions: dict[str, Mission]) -> Section:
 
 
 def _lines(missions: dict[str, Mission]) -> Iterator[list[str]]:
-    for name, mission in missions.items():
+    for name, mission in _by_layout(missions).items():
         (whole,) = sights(mission, 0)
         yield [name, "none", *_shares(whole), ""]
         pairs = sights(mission, 2)
@@ -76,12 +84,21 @@ def _lines(missions: dict[str, Mission]) -> Iterator[list[str]]:
         yield [name, "two, the worst", *_shares(worst), " and ".join(map(str, worst.cells))]
 
 
+def _by_layout(missions: dict[str, Mission]) -> dict[str, Mission]:
+    """A mission for each layout, by the names of all that have it."""
+    names: dict[str, list[str]] = {}
+    for name, mission in missions.items():
+        names.setdefault(str((mission.values.cells, mission.values.spacecraft.array_normal)), []).append(name)
+    return {"; ".join(same): missions[same[0]] for same in names.values()}
+
+
 def _shares(sight: Sight) -> list[str]:
     return [f"{100.0 * value:.1f} %" for value in sight[1:]]
 
 
 _ARGUMENT = (
     "Share of the sky, and of the directions within 30 deg of the array normal, from which no cell or only one of "
-    "those that are left sees the Sun. One cell gives a cone of directions, two give two directions: where these "
-    "shares are large in power, no flight can be asked to stay there by its cells alone, whatever it knows of them."
+    f"those that are left sees the Sun with more than {DIM:g} of full output, which the Earth alone may give. One cell "
+    "gives a cone of directions, two give two directions: where these shares are large in power, no flight can be "
+    "asked to stay there by its cells alone, whatever it knows of them."
 )

@@ -75,7 +75,6 @@ _WHEEL_KINDS: tuple[tuple[str, str, str, Mapping[str, str]], ...] = (
 _ROD_KINDS: tuple[tuple[str, str, Mapping[str, str]], ...] = (
     ("dead", "dead", {}),
     ("frozen", "frozen", {}),
-    ("stuck", "stuck", {"level": "0.1"}),
     ("wrong sign", "sign", {}),
     ("scaled by 0.5", "scaled", {"factor": "0.5"}),
     ("intermittent, half of 2 s", "intermittent", {"share": "0.5", "spell": "2"}),
@@ -143,8 +142,9 @@ def wheel_faults() -> Iterator[Fault]:
 _QUICK_WHEEL = ("wheel", "dead")
 
 
-def rod_faults() -> Iterator[Fault]:
-    """Of one torque rod."""
+def rod_faults(level: float) -> Iterator[Fault]:
+    """Of one torque rod, that may be stuck at a dipole [A m^2]."""
+    yield _fault(ROD, f"stuck at {level:g} A m^2", _entry("rod.any", "stuck", {"level": f"{level:g}"}))
     for label, kind, values in _ROD_KINDS:
         yield _fault(ROD, label, _entry("rod.any", kind, values))
 

@@ -2,7 +2,7 @@
 """What a fault did to the cases of one line, against the same cases without it and without the cell that failed."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -28,6 +28,7 @@ class Outcome(NamedTuple):
 
     cases: int
     power: float | None  # share of the cases that end in power
+    power_seen: float | None  # the same of the cases in which enough cells are left to see the Sun in power
     later_median: float | None  # [s] more sunlight beyond 30 deg of the array normal than without the fault
     later_max: float | None  # infinite: some case never came within
     ratio: float | None  # mean heading error over that of the mission without the cell
@@ -66,7 +67,12 @@ def counted_cases(fault: Fault, failed: list[frozenset[int]]) -> np.ndarray:
 
 
 def outcome(
-    of: Column, without: Column, counted: np.ndarray, lacking: Mapping[frozenset[int], np.ndarray], failed: list
+    of: Column,
+    without: Column,
+    counted: np.ndarray,
+    lacking: Mapping[frozenset[int], np.ndarray],
+    failed: list[frozenset[int]],
+    seen: Collection[frozenset[int]] = (),
 ) -> Outcome:
     """What became of the cases of a line.
 
@@ -75,6 +81,7 @@ def outcome(
         counted: (C,) the cases that count.
         lacking: heading errors (C,) of missions without some cells, by these.
         failed: the cells that fail in each case.
+        seen: sets of cells without which the Sun is still seen in power.
     """
     converging, reference = of("converging_s")[counted], without("converging_s")[counted]
     # a case that never had the Sun within 30 deg has no time; where it has none without the fault either, none is lost
@@ -87,6 +94,7 @@ def outcome(
     return Outcome(
         cases=int(counted.sum()),
         power=_mean(np.isfinite(of("power_positive_from_s")[counted]).astype(float)),
+        power_seen=_share(np.isfinite(of("power_positive_from_s")), counted & [cells in seen for cells in failed]),
         later_median=float(np.median(later)) if len(later) else None,
         later_max=float(np.max(later)) if len(later) else None,
         ratio=_ratio(of("heading_error_mean_deg"), counted, lacking, failed),

@@ -56,6 +56,7 @@ class Subject(NamedTuple):
     sorts: tuple[str, ...]  # of faults that it flies
     within_s: float  # faults begin by then
     board: str = ""  # cells that share one
+    rod_dipole: float = 0.1  # [A m^2] at which rods are stuck: half of what they can
     quick: bool = False
 
     def loaded(self, quick: bool) -> Mission:
@@ -77,14 +78,13 @@ class Subject(NamedTuple):
     def _of(self, sort: str) -> Iterable[Fault]:
         if sort == BOARD:
             return [board_fault(self.board)] if self.board else []
-        return _FAULTS[sort]()
+        return rod_faults(self.rod_dipole) if sort == ROD else _FAULTS[sort]()
 
 
 _FAULTS = {
     CELL: cell_faults,
     PAIR: pairs,
     WHEEL: wheel_faults,
-    ROD: rod_faults,
     GYRO: gyro_faults,
     MAGNETOMETER: magnetometer_faults,
 }
@@ -128,6 +128,7 @@ def subjects() -> list[Subject]:
             (*_CELLS, WHEEL, ROD, MAGNETOMETER),
             6000.0,
             board="11-13",
+            rod_dipole=10.0,
         ),
         Subject(
             "3U, safe", "cubesat_3u_safe", "wls", False, (), _CLOUDS, (*_CELLS, ROD, MAGNETOMETER), 9000.0, board="0-1"

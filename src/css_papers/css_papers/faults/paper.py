@@ -2,7 +2,7 @@
 """Every fault on every mission: power, errors, and what was found of it, beside the same cases without the fault."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from css_common.mission import Mission
 from css_monte_carlo.study import Configuration, Study, run_study
-from css_papers.faults.blind import blind_section
+from css_papers.faults.blind import blind_section, sights
 from css_papers.faults.cost import cost_ns
 from css_papers.faults.kinds import BOARD, CELL, NONE, PAIR, Fault
 from css_papers.faults.measured import Outcome, counted_cases, failed_cells, outcome
@@ -44,6 +44,8 @@ _DEFINITIONS = (
     "cases: one orbit or more from any attitude, at any date, under clouds of its own, with cells that nobody has "
     "calibrated (gains 2 %, tilts 1 deg); the unit that fails and when it does are drawn for each",
     "in power: at the last step in sunlight the Sun is within 30 deg of the array normal",
+    "in power, of pairs of cells: over all cases; the numbers of `--json` have besides those whose pair leaves two "
+    "cells in the Sun wherever it is in power",
     "later: sunlit time with the Sun beyond 30 deg of the array normal, less that of the same case without the fault",
     "error / without the cell: mean heading error over the cases, over that of the same cases flown by a mission whose "
     "layout never had the cell that fails",
@@ -76,7 +78,7 @@ def reproduce(request: Request) -> list[Row]:
     missed = [line for line in judged if not line.ok]
     summary = f"{len(judged)} numbers have to be in a range, {len(missed) or 'none'} of them are not."
     sections = [
-        Section("In one line", [summary, Listing([_missed(line) for line in missed])]),
+        Section("What is missed", [summary, Listing(_missed(missed))]),
         *(Section(each.subject.label, [_about(each), Table(_HEADING, list(_lines(each)))]) for each in flown),
         blind_section({each.subject.label: each.mission for each in flown if PAIR in each.subject.sorts}),
         Section("What is measured", [Listing(_DEFINITIONS)]),
@@ -104,8 +106,9 @@ def fly(subject: Subject, request: Request) -> Flown:
     lacking = {
         frozenset(each.cells): column(study.cases, each.configuration, "heading_error_mean_deg") for each in without
     }
+    seen = [frozenset(pair.cells) for pair in sights(mission, 2) if pair.keeps_power] if PAIR in subject.sorts else []
     outcomes = {
-        fault: _outcome(fault, configuration, configurations[NONE], mission, study.cases, lacking, request.cases)
+        fault: _outcome(fault, configuration, configurations[NONE], mission, study.cases, lacking, seen, request.cases)
         for fault, configuration in configurations.items()
     }
     return Flown(subject, mission, outcomes, cost_ns(mission, configurations[NONE]), _spent(subject, study))
@@ -118,6 +121,7 @@ def _outcome(
     mission: Mission,
     cases: pa.Table,
     lacking: Mapping[frozenset[int], np.ndarray],
+    seen: Sequence[frozenset[int]],
     count: int,
 ) -> Outcome:
     failed = failed_cells(flown.applied(mission), count)
@@ -127,6 +131,7 @@ def _outcome(
         counted_cases(fault, failed),
         lacking,
         failed,
+        seen,
     )
 
 
@@ -148,6 +153,9 @@ def rows_of(flown: Flown) -> Iterator[Row]:
         single = fault.sort not in (PAIR, BOARD)
         power = _ALMOST_ALL if fault.sort == PAIR else _ALL if single else None
         yield row(f"{label}: in power", "-", None, found.power, power, variant=variant)
+        if fault.sort == PAIR and found.power_seen is not None:
+            where = "in power where two cells are left in the Sun"
+            yield row(f"{label}: {where}", "-", None, found.power_seen, variant=variant)
         later = found.later_max if found.later_max is not None and math.isfinite(found.later_max) else None
         yield row(f"{label}: later, most", "s", None, later, _LATER if single else None, variant=variant)
         if fault.sort == CELL:
@@ -162,8 +170,14 @@ def rows_of(flown: Flown) -> Iterator[Row]:
     yield row("finding faults, a step", "ns", None, flown.cost_ns, variant=variant)
 
 
-def _missed(line: Row) -> str:
-    return f"{line.variant}: {line.quantity}: {number(line.here)} {line.unit}, must be {line.must}"
+def _missed(lines: Sequence[Row]) -> list[str]:
+    """A text for each line of the page that misses something."""
+    by_line: dict[tuple[str, str], list[str]] = {}
+    for line in lines:
+        fault, _, asked = line.quantity.partition(": ")
+        unit = "" if line.unit == "-" else f" {line.unit}"
+        by_line.setdefault((line.variant, fault), []).append(f"{asked} {number(line.here)}{unit} ({line.must})")
+    return [f"{subject}, {fault}: {'; '.join(texts)}" for (subject, fault), texts in by_line.items()]
 
 
 def _about(flown: Flown) -> str:
