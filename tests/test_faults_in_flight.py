@@ -114,7 +114,9 @@ def test_each_fault_is_told_from_its_begin_to_its_end(mission, flown):
                 values = [float(word) for word in words[: words.index("from")]]
                 assert [value for value, _ in record.values.values()] == values
     assert told == {}
-    assert log.faults == fly_directly(mission).faults
+    directly = fly_directly(mission)
+    assert log.faults == directly.faults
+    assert log.health == directly.health
 
 
 def test_a_switched_sensor_forgets_where_it_froze_and_other_changes_do_not():

@@ -10,6 +10,7 @@ from presence import present
 from css_common.kernel import typed_call
 from css_common.mission import load_mission
 from css_estimation.sun import pyramid_switch
+from css_monte_carlo.mission_flight import MissionFlight
 from css_papers.faults import paper
 from css_papers.faults.blind import DIM, sights
 from css_papers.faults.kinds import CELL, NONE, PAIR, cell_faults, gyro_faults, pairs, rod_faults, wheel_faults
@@ -119,6 +120,15 @@ def test_found_is_asked_of_the_cases_in_which_a_fault_shows():
     assert outcome(wrong, columns(), ALL, {}, [frozenset()] * 3).named is None
     missed = outcome(columns(fault_shown_s=[5.0, 5.0, 5.0], detected_s=[3.0, np.nan, np.nan]), columns(), ALL, {}, ONES)
     assert missed.detected == pytest.approx(1.0 / 3.0) and missed.promptly == pytest.approx(1.0 / 3.0)
+
+
+def test_the_cells_that_fail_are_those_that_fly():
+    subject = BY_LABEL["wavg"]
+    mission = subject.loaded(quick=True)
+    swapped = next(fault for fault in cell_faults() if fault.entries[0].kind == "swapped")
+    flown = subject.configuration(swapped, True).applied(mission)
+    cases = MissionFlight(flown).cases(np.arange(30))[0]
+    assert failed_cells(flown, 30) == [frozenset(units) for units in cases.faults["unit"].tolist()]
 
 
 def test_a_line_without_cases_has_no_numbers():

@@ -11,7 +11,7 @@ from css_common.mission import Mission
 from css_common.random_streams import random_key
 from css_papers.faults.kinds import PAIR, Fault
 from css_sim import cell_faults
-from css_sim.fault_effects import NEVER, SWAPPED
+from css_sim.fault_effects import NEVER
 
 PROMPTLY_S = 10.0
 """Time [s] within which dead, stuck and wrapped cells have to be found."""
@@ -43,20 +43,11 @@ class Outcome(NamedTuple):
 
 
 def failed_cells(mission: Mission, cases: int) -> list[frozenset[int]]:
-    """The cells that fail in each case of a mission."""
+    """The cells that fail in each case of a mission; of two that are swapped the one that was drawn."""
     values = mission.node("css_array").values
-    seed = mission.values.mission.seed
-    found = []
-    for case in range(cases):
-        failed: set[int] = set()
-        for fault in cell_faults.case_faults(values, random_key(seed, case)):
-            if fault.first_step == NEVER:
-                continue
-            failed.add(fault.unit)
-            if fault.kind == SWAPPED:
-                failed.add(int(fault.values[0]))
-        found.append(frozenset(failed))
-    return found
+    keys = (random_key(mission.values.mission.seed, case) for case in range(cases))
+    drawn = (cell_faults.case_faults(values, key) for key in keys)
+    return [frozenset(fault.unit for fault in faults if fault.first_step < NEVER) for faults in drawn]
 
 
 def counted_cases(fault: Fault, failed: list[frozenset[int]]) -> np.ndarray:
