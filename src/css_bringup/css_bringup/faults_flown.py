@@ -30,7 +30,7 @@ class FaultsFlown(NamedTuple):
         """The detections as plain data."""
         return [
             {
-                **({} if found.health is None else _plain(found.health)),
+                **_plain(found.health),
                 "fault": None if found.fault is None else found.fault.text(),
                 "after_s": found.after_s,
                 "false": found.is_false,
@@ -39,8 +39,8 @@ class FaultsFlown(NamedTuple):
         ]
 
 
-def _plain(record: HealthRecord) -> dict[str, Any]:
-    return {name: value for name, value in record._asdict().items() if name != "names"}
+def _plain(record: HealthRecord | None) -> dict[str, Any]:
+    return {name: getattr(record, name, None) for name in HealthRecord._fields if name != "names"}
 
 
 NOTHING_FLOWN = FaultsFlown([], [])

@@ -108,7 +108,9 @@ def test_a_false_isolation_is_a_warning_and_a_missed_fault_a_line(last_lines):
     assert "detection: cell.3 stuck, level 0.7, from 5 s on: not detected\n" in out
     warning = "ekf held cell.5 for failed at 8 s, on which no fault acts"
     assert f"warning: {warning}" in err and warning in told["warnings"]
-    assert [found["false"] for found in told["detections"]] == [True, False]
+    false, missed = told["detections"]
+    assert false["false"] and not missed["false"] and missed["after_s"] is None and missed["target"] is None
+    assert missed.keys() == false.keys() and missed["fault"] == "cell.3 stuck, level 0.7, from 5 s on"
 
 
 def test_without_truth_nobody_says_that_it_is_false(tmp_path):
