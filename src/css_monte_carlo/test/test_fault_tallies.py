@@ -3,6 +3,8 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from css_analysis import fault_sums
 from css_analysis.fault_sums import CELLS, RODS, SENSORS, WHEELS
@@ -112,6 +114,30 @@ def test_actuators_and_sensors_have_sums_of_their_own():
     assert [of_one(fault_sums.isolated_units(sums, s)) for s in (CELLS, WHEELS, RODS, SENSORS)] == [0, 1, 1, 2]
     assert [of_one(fault_sums.false_isolations(sums, s)) for s in (CELLS, WHEELS, RODS, SENSORS)] == [0, 0, 1, 1]
     assert of_one(fault_sums.detected_s(sums, PERIOD_S)) == PERIOD_S
+
+
+masks = st.integers(0, 2**32 - 1).map(lambda bits: bits & 0x8000_0105)
+
+
+@given(st.lists(st.tuples(masks, masks, masks), max_size=30))
+def test_any_flight_is_counted_as_whole_columns_say(steps):
+    """Bits of (failed, evident of them, held) over time, each unit by itself."""
+    failed, evident, held = (np.array([step[i] for step in steps], np.int64) for i in range(3))
+    evident &= failed
+    sums = counted(
+        (NOTHING_FAILS._replace(cells=int(f), cells_evident=int(e)), NOTHING_HELD._replace(cells=int(h)))
+        for f, e, h in zip(failed, evident, held, strict=True)
+    )
+    false = ever = 0
+    for unit in range(32):
+        fails, shows, is_held = ((column >> unit & 1).astype(bool) for column in (failed, evident, held))
+        begins = is_held & ~np.concatenate(([False], is_held[:-1]))[: len(steps)]
+        false += int(np.count_nonzero(begins & ~fails))
+        ever += int(is_held.any())
+        for found, when in ((sums.shown_step, shows), (sums.found_step, fails & is_held)):
+            assert found[0, CELLS, unit] == (int(np.argmax(when)) if when.any() else -1)
+    assert of_one(fault_sums.false_isolations(sums, CELLS)) == false
+    assert of_one(fault_sums.isolated_units(sums, CELLS)) == ever
 
 
 def test_units_fail_while_their_faults_act():
