@@ -43,12 +43,13 @@ def _columns_of(runs: Sequence[Run]) -> list[Quantity]:
 
 def isolated_lines(runs: Iterable[Run]) -> list[str]:
     """A line for each run that left out cells for failed."""
-    return [
-        f"{run['estimator']}{' (flown)' if run['flown'] else ''} left out {'cell' if len(run['isolated_cells']) == 1 else 'cells'} "
-        f"{', '.join(map(str, run['isolated_cells']))} for failed, for some time or all"
-        for run in runs
-        if run.get("isolated_cells")
-    ]
+    return [_isolated_line(run) for run in runs if run.get("isolated_cells")]
+
+
+def _isolated_line(run: Run) -> str:
+    cells, flown = run["isolated_cells"], " (flown)" if run["flown"] else ""
+    numbers = f"{'cell' if len(cells) == 1 else 'cells'} {', '.join(map(str, cells))}"
+    return f"{run['estimator']}{flown} left out {numbers} for failed, for some time or all"
 
 
 class Verdict(NamedTuple):

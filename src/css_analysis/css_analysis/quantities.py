@@ -404,8 +404,8 @@ _FAULTS = (
         "fault_shown_s",
         "s",
         "time since the epoch at which the first fault shows: that of a cell when its reading is off by more than "
-        "5 sigma of its noise, its drawn loss and 0.4 of the light of the Earth on it; that of other units when it "
-        "begins",
+        "5 sigma of its noise, losses, calibration and 0.4 of the light of the Earth on it; that of other units when "
+        "it begins",
         tally=lambda sums: fault_sums.shown_s(sums.health, sums.period_s),
     ),
     Quantity(

@@ -11,9 +11,8 @@ from css_common.fault_lines import FAULTS
 from css_common.kernel import typed_call
 from css_common.mission import Mission, Node
 from css_common.stepping import Stepper
-from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells, failing_units
+from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells, failing_units, uncertainty_of
 from css_monte_carlo.health_tallies import UNITS
-from css_sim import sun_cells
 from css_sim.fault_effects import FAULT, NEVER
 from css_sim.fault_kinds import AXES, KINDS, SORTS
 from css_sim.nodes.css_array import CssArray
@@ -62,12 +61,12 @@ def _note_evident(log: FlightLog, failing: list[Failing]) -> None:
         return
     rows, steps = log.truth_rows(voltages)
     row_of = dict(zip(steps.tolist(), rows.tolist(), strict=True))
-    p, evident = sun_cells.parameters(array.values), typed_call(evident_cells)
+    uncertainty, evident = uncertainty_of(array.values), typed_call(evident_cells)
     for step, of_step in enumerate(_healthy_cells(log, mission, array)):
         cells = failing[step].cells
         if cells and of_step is not None and step in row_of:
             healthy, albedo = of_step
-            shown = evident(p, cells, healthy, voltages.voltages[row_of[step]], albedo)
+            shown = evident(uncertainty, cells, healthy, voltages.voltages[row_of[step]], albedo)
             failing[step] = failing[step]._replace(cells_evident=shown)
 
 

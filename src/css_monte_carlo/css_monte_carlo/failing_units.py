@@ -5,9 +5,10 @@ import math
 from typing import NamedTuple
 
 from css_common.kernel import kernel
+from css_common.schema import Values
 from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO
+from css_sim import cell_errors, sun_cells
 from css_sim.fault_effects import CELL, GYRO, MAGNETOMETER, ROD, SWAPPED, TACHOMETER, WHEEL, acts
-from css_sim.sun_cells import SunCells
 
 EVIDENT = 5.0
 """Standard deviations of a healthy reading by which that of a failed cell is off once it shows."""
@@ -52,24 +53,40 @@ def failing_units(faults, step: int) -> Failing:
     return Failing(cells, 0, wheels, rods, sensors)
 
 
+class Uncertainty(NamedTuple):
+    """How well a healthy reading of a cell could be known by one who knows attitude and Sun, 1 sigma."""
+
+    constant: float  # [-] noise and offset
+    share: float  # of the reading: losses and errors of scale
+    tilt: float  # [rad] of the normal, and so at most as much of the reading
+    lsb: float  # [-] step of the converter
+
+
+def uncertainty_of(values: Values) -> Uncertainty:
+    """Of the cells of a `css_array` node."""
+    p, errors = sun_cells.parameters(values), cell_errors.error_model(values)
+    losses = (loss / math.sqrt(12.0) for loss in (p.degradation, errors.fixed_degradation))
+    share = math.hypot(*losses, errors.scale_common_error, errors.scale_cell_error)
+    lsb = (p.output_high - p.output_low) / p.levels if p.levels > 0.0 else 0.0
+    return Uncertainty(math.hypot(p.noise, errors.bias), share, errors.misalignment, lsb)
+
+
 @kernel
-def evident_cells(p: SunCells, failed: int, healthy, voltages, albedo) -> int:
+def evident_cells(u: Uncertainty, failed: int, healthy, voltages, albedo) -> int:
     """Mask of those failed cells that read otherwise than without a fault, by more than a healthy reading is uncertain.
 
-    A reading is uncertain by its noise, the loss that is drawn anew every step, and the light of the Earth.
-
     Args:
+        u: of all cells; the light of the Earth comes on top.
         failed: mask of the cells that faults act on.
         healthy: (N,) what the cells would read without faults [-].
         voltages: (N,) what they read [-].
         albedo: (N,) light reflected by the Earth that they receive [-].
     """
     evident = 0
-    lsb = (p.output_high - p.output_low) / p.levels if p.levels > 0.0 else 0.0
-    loss = p.degradation / math.sqrt(12.0)
+    own = math.hypot(u.constant, u.tilt)
     for i in range(voltages.shape[0]):
         if failed >> i & 1:
-            of_light = math.hypot(loss * healthy[i], EARTH_UNKNOWN * albedo[i])
-            if abs(voltages[i] - healthy[i]) > EVIDENT * math.hypot(p.noise, of_light) + lsb:
+            of_light = math.hypot(u.share * healthy[i], EARTH_UNKNOWN * albedo[i])
+            if abs(voltages[i] - healthy[i]) > EVIDENT * math.hypot(own, of_light) + u.lsb:
                 evident |= 1 << i
     return evident

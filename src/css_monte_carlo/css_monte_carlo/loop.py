@@ -20,7 +20,7 @@ from css_estimation.sun.heading_dispatch import estimate_heading
 from css_estimation.sun.sky_table import sky_at
 from css_estimation.sun.sun_heading import Aiding
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, note_estimate, tally
-from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells, failing_units
+from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, Uncertainty, evident_cells, failing_units
 from css_monte_carlo.named_faults import note_kinds
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
@@ -40,6 +40,7 @@ class Vehicle(NamedTuple):
 
     period_ns: int
     sensors: Sensors
+    uncertainty: Uncertainty  # of healthy cells
     own_earth: bool  # each case has its own reflectivities
     albedo_model: int  # of `albedo_vector`
     clouds: Clouds
@@ -183,7 +184,7 @@ def fly_block(
             failing = NOTHING_FAILS
             if faults.shape[0] > 0:
                 failing = failing_units(faults, step)
-                evident = evident_cells(v.sensors.cells, failing.cells, cases.healthy[c], voltages, cases.albedo[c])
+                evident = evident_cells(v.uncertainty, failing.cells, cases.healthy[c], voltages, cases.albedo[c])
                 failing = Failing(failing.cells, evident, failing.wheels, failing.rods, failing.sensors)
             momentum_b = sum_along_axes(craft.body.wheels, momentum)
             truth = Truth(

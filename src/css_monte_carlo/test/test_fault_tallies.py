@@ -15,12 +15,11 @@ from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import Tallies
 from css_monte_carlo.chunk import fly_cases
-from css_monte_carlo.failing_units import NOTHING_FAILS, evident_cells, failing_units
+from css_monte_carlo.failing_units import NOTHING_FAILS, evident_cells, failing_units, uncertainty_of
 from css_monte_carlo.health_tallies import HealthTallies, Held, new_health, tally_health
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.named_faults import class_of_kind, note_cell_kinds
 from css_monte_carlo.stepped_flight import SteppedFlight
-from css_sim import sun_cells
 from css_sim.fault_effects import (
     BIAS,
     CELL,
@@ -160,17 +159,27 @@ def test_units_fail_while_their_faults_act():
     [
         (("css_array.noise=0.01", "css_array.degradation=0"), 0.0, 0.05),
         (("css_array.noise=0", "css_array.degradation=0.06"), 0.0, 5 * 0.06 / np.sqrt(12.0) * 0.5),
+        (
+            ("css_array.degradation=0", "css_array.scale_cell_error=0.03", "css_array.scale_common_error=0.04"),
+            0.0,
+            0.125,
+        ),
+        (
+            ("css_array.degradation=0", "css_array.misalignment_deg=1", "css_array.bias=0.01"),
+            0.0,
+            5 * np.hypot(0.01, np.pi / 180),
+        ),
         (("css_array.noise=0.03", "css_array.degradation=0"), 0.1, 5 * np.hypot(0.03, 0.04)),
         (("css_array.noise=0.01", "css_array.degradation=0", "css_array.bits=8"), 0.0, 0.05 + 2.0 / 256),
     ],
 )
 def test_a_fault_shows_beyond_what_a_healthy_reading_is_uncertain_by(settings, albedo, threshold):
     mission = load_mission("okeefe_2013", settings)
-    p = sun_cells.parameters(mission.node("css_array").values)
+    u = uncertainty_of(mission.node("css_array").values)
     evident, healthy = typed_call(evident_cells), np.full(3, 0.5)
     light = np.full(3, albedo)
     for off, expected in ((0.99 * threshold, 0), (1.01 * threshold, 0b101), (-1.01 * threshold, 0b101)):
-        assert evident(p, 0b101, healthy, healthy + off, light) == expected
+        assert evident(u, 0b101, healthy, healthy + off, light) == expected
 
 
 FAULTS = (

@@ -49,8 +49,8 @@ _DEFINITIONS = (
     "later: sunlit time with the Sun beyond 30 deg of the array normal, less that of the same case without the fault",
     "error / without the cell: mean heading error over the cases, over that of the same cases flown by a mission whose "
     "layout never had the cell that fails",
-    "shows: a cell is off by more than 5 sigma of what a healthy reading is uncertain by (noise, drawn loss, 0.4 of "
-    "the light of the Earth on it); other units from when they fail",
+    "shows: a cell is off by more than 5 sigma of what a healthy reading is uncertain by (noise, losses, calibration, "
+    "0.4 of the light of the Earth on it); other units from when they fail",
     "found: of the cases in which a fault shows, those in which all that show are isolated; times from when it shows",
     "named rightly: of those found, the cases in which every cell was last taken for what it is; one class are: dead "
     "and stuck at zero, frozen there or with the wrong sign before a converter without negative readings; stuck, "
