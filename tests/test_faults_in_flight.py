@@ -196,6 +196,15 @@ def test_a_fault_that_never_comes_is_named():
     assert line == "fault one at 500 s never comes, the last step is at 19.9 s"
 
 
+def test_a_value_of_an_entry_has_the_bounds_of_what_fails():
+    """A level of 20000 is one of a field in nT, and of no wheel in N m."""
+    mission = mission_with(entry("time: 2.0, target: magnetometer.x, kind: stuck, level: 1.0"))
+    (changed,) = mission.with_overrides(["faults.one.level=20000"]).faults
+    assert changed.line.startswith("magnetometer.x stuck 20000 ")
+    with pytest.raises(MissionError, match=r"faults.one.level: 2000000.0 given, expected at least -1e\+06 and at most"):
+        mission.with_overrides(["faults.one.level=2e6"])
+
+
 def test_the_faults_of_the_readme_are_valid():
     text = (ROOT / "src" / "css_sim" / "README.md").read_text()
     found = re.search(r"```yaml\n/\*\*:\n  ros__parameters:\n(    faults:\n.*?)```", text, re.S)
