@@ -29,11 +29,6 @@ class Sight(NamedTuple):
     blind_in_power: float
     cone_in_power: float
 
-    @property
-    def keeps_power(self) -> bool:
-        """Whether two cells or more see the Sun from all directions within 30 deg of the array normal."""
-        return self.blind_in_power == self.cone_in_power == 0.0
-
 
 def sights(mission: Mission, failing: int, dim: float = DIM) -> list[Sight]:
     """Of each set of so many cells, of which those count that read more than `dim` in the light of the Sun."""
@@ -41,6 +36,13 @@ def sights(mission: Mission, failing: int, dim: float = DIM) -> list[Sight]:
     layout = layout._replace(chain=layout.chain._replace(dropout=dim))
     count = len(layout.cells)
     return [_sight(layout, grid, cells) for cells in combinations(range(count), failing)]
+
+
+def harmless_pairs(mission: Mission) -> list[frozenset[int]]:
+    """The pairs of cells without which two cells or more see the Sun from as many directions in power as with them."""
+    (whole,) = sights(mission, 0)
+    seen = (whole.blind_in_power, whole.cone_in_power)
+    return [frozenset(pair.cells) for pair in sights(mission, 2) if (pair.blind_in_power, pair.cone_in_power) == seen]
 
 
 def _grid(mission: Mission) -> Grid:

@@ -28,7 +28,7 @@ class Outcome(NamedTuple):
 
     cases: int
     power: float | None  # share of the cases that end in power
-    power_seen: float | None  # the same of the cases in which enough cells are left to see the Sun in power
+    power_seen: float | None  # the same of the cases whose failed cells are not needed to see the Sun there
     later_median: float | None  # [s] more sunlight beyond 30 deg of the array normal than without the fault
     later_max: float | None  # infinite: some case never came within
     ratio: float | None  # mean heading error over that of the mission without the cell
@@ -72,7 +72,7 @@ def outcome(
         counted: (C,) the cases that count.
         lacking: heading errors (C,) of missions without some cells, by these.
         failed: the cells that fail in each case.
-        seen: sets of cells without which the Sun is still seen in power.
+        seen: sets of cells without which the Sun is seen in power as with them.
     """
     converging, reference = of("converging_s")[counted], without("converging_s")[counted]
     # a case that never had the Sun within 30 deg has no time; where it has none without the fault either, none is lost

@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from css_common.mission import Mission
 from css_monte_carlo.study import Configuration, Study, run_study
-from css_papers.faults.blind import blind_section, sights
+from css_papers.faults.blind import blind_section, harmless_pairs
 from css_papers.faults.cost import cost_ns
 from css_papers.faults.kinds import BOARD, CELL, NONE, PAIR, Fault
 from css_papers.faults.measured import Outcome, counted_cases, failed_cells, outcome
@@ -44,8 +44,8 @@ _DEFINITIONS = (
     "cases: one orbit or more from any attitude, at any date, under clouds of its own, with cells that nobody has "
     "calibrated (gains 2 %, tilts 1 deg); the unit that fails and when it does are drawn for each",
     "in power: at the last step in sunlight the Sun is within 30 deg of the array normal",
-    "in power, of pairs of cells: over all cases; the numbers of `--json` have besides those whose pair leaves two "
-    "cells in the Sun wherever it is in power",
+    "in power, of pairs of cells: over all cases; the numbers of `--json` have besides those whose pair is not needed "
+    "in power: without it as many directions there are seen by two cells",
     "later: sunlit time with the Sun beyond 30 deg of the array normal, less that of the same case without the fault",
     "error / without the cell: mean heading error over the cases, over that of the same cases flown by a mission whose "
     "layout never had the cell that fails",
@@ -106,7 +106,7 @@ def fly(subject: Subject, request: Request) -> Flown:
     lacking = {
         frozenset(each.cells): column(study.cases, each.configuration, "heading_error_mean_deg") for each in without
     }
-    seen = [frozenset(pair.cells) for pair in sights(mission, 2) if pair.keeps_power] if PAIR in subject.sorts else []
+    seen = harmless_pairs(mission) if PAIR in subject.sorts else []
     outcomes = {
         fault: _outcome(fault, configuration, configurations[NONE], mission, study.cases, lacking, seen, request.cases)
         for fault, configuration in configurations.items()
@@ -154,7 +154,7 @@ def rows_of(flown: Flown) -> Iterator[Row]:
         power = _ALMOST_ALL if fault.sort == PAIR else _ALL if single else None
         yield row(f"{label}: in power", "-", None, found.power, power, variant=variant)
         if fault.sort == PAIR and found.power_seen is not None:
-            where = "in power where two cells are left in the Sun"
+            where = "in power where the pair is not needed there"
             yield row(f"{label}: {where}", "-", None, found.power_seen, variant=variant)
         later = found.later_max if found.later_max is not None and math.isfinite(found.later_max) else None
         yield row(f"{label}: later, most", "s", None, later, _LATER if single else None, variant=variant)
