@@ -19,6 +19,7 @@ class Judge(Component):
     """A component that holds units for failed."""
 
     shared = ("wheels",)
+    lines: list[str]
 
     @classmethod
     def outputs(cls, name, values):

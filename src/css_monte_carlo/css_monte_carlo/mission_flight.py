@@ -220,6 +220,12 @@ class MissionFlight:
         p = watched.watched_parameters(algorithm, self._heading.values)
         return watched.initial_state(algorithm, p), watched.initial_memory(algorithm, p)
 
+    def _heading_parameters(self, values: Values | None) -> Any:
+        """Parameters of the Sun estimator, behind the health of its sensors; None without one."""
+        if self._heading is None or values is None:
+            return None
+        return watched.watched_parameters(_algorithm(self._heading), values)
+
     def _initial_attitude(self, key: RandomKey, sigma_bn: Vec3, guess_deg: float) -> tuple[Any, Any]:
         """State and memory of the attitude filter."""
         if self._filter is None:
@@ -254,7 +260,7 @@ class MissionFlight:
             attitude_hears_field=attitude_hears,
             heading_hears_wheels=heading is not None and hears_wheels(heading),
             attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
-            heading=None if heading is None else watched.watched_parameters(_algorithm(self._heading), heading),
+            heading=self._heading_parameters(heading),
             attitude=_parameters(self._filter, attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
