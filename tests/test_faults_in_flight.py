@@ -113,7 +113,9 @@ def test_each_fault_is_told_from_its_begin_to_its_end(mission, flown):
                 values = [float(word) for word in words[: words.index("from")]]
                 assert [value for value, _ in record.values.values()] == values
     assert told == {}
-    assert log.faults == fly_directly(mission).faults
+    directly = fly_directly(mission)
+    assert log.faults == directly.faults
+    assert log.health == directly.health
 
 
 def test_a_switched_sensor_forgets_where_it_froze_and_other_changes_do_not():
@@ -191,6 +193,15 @@ def test_wrong_entries_are_refused_with_what_would_be_right(text):
 def test_a_fault_that_never_comes_is_named():
     (line,) = preflight(mission_with(entry("time: 500.0, target: cell.1, kind: dead")))
     assert line == "fault one at 500 s never comes, the last step is at 19.9 s"
+
+
+def test_a_value_of_an_entry_has_the_bounds_of_what_fails():
+    """A level of 20000 is one of a field in nT, and of no wheel in N m."""
+    mission = mission_with(entry("time: 2.0, target: magnetometer.x, kind: stuck, level: 1.0"))
+    (changed,) = mission.with_overrides(["faults.one.level=20000"]).faults
+    assert changed.line.startswith("magnetometer.x stuck 20000 ")
+    with pytest.raises(MissionError, match=r"faults.one.level: 2000000.0 given, expected at least -1e\+06 and at most"):
+        mission.with_overrides(["faults.one.level=2e6"])
 
 
 def test_the_faults_of_the_readme_are_valid():

@@ -157,6 +157,7 @@ class Component:
 
     Attributes:
         report: takes a line for the log; a host makes it the node's.
+        left_out: names of the units that it holds for failed, such as `cell.3`.
 
     Class attributes:
         shared: mission sections whose values the component reads (`shared_sections`), besides mission and io.
@@ -174,6 +175,7 @@ class Component:
         self.name = name
         self.values = values
         self.report: Callable[[str], object] = _unheard
+        self.left_out: tuple[str, ...] = ()
         self.period_ns = round(values.mission.period * 1e9)
         self.epoch_ns = mission_epoch(values.mission)
         self.frames = {

@@ -270,5 +270,11 @@ def entry_parameter(key: str, hosts: Iterable[Host]) -> Parameter[Any] | None:
     if not key.startswith(SECTION) or key.count(".") != 2:
         return None
     field = key.rpartition(".")[2]
-    values = (v.parameter for host in hosts for kind in host.kinds for v in kind.values)
+    # several sorts have values of a name, within bounds of their own: those are checked with the entry
+    values = (
+        replace(v.parameter, unit="", low=None, high=None, open_low=False)
+        for host in hosts
+        for kind in host.kinds
+        for v in kind.values
+    )
     return next((replace(p, name=key) for p in (*ENTRY, *values) if p.name == field), None)

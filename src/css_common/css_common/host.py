@@ -484,17 +484,25 @@ class ComponentNode(LifecycleNode):
             counters["time_set_back"] = self.matcher.set_back
             if self.stepper.skipped:
                 counters["skipped"] = self.stepper.skipped
+        level, message = self._own_state()
+        left_out = () if self.component is None else self.component.left_out
+        if left_out and level == DiagnosticStatus.OK:
+            level, message = DiagnosticStatus.WARN, f"held for failed: {', '.join(left_out)}"
+        return Health(level, message, counters, self._last_stamp, left_out)
+
+    def _own_state(self) -> tuple[bytes, str]:
+        """Level and one line, of what goes on in the node itself."""
         if any(self.counters[kind] > self._forgiven[kind] for kind in ("cycle_failed", "withheld_not_finite")):
-            return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
+            return DiagnosticStatus.ERROR, "cycles failed"
         if any(edge.rejected for edge in self.edges.values()):
-            return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
+            return DiagnosticStatus.WARN, "messages rejected"
         if any(subscription.refused for subscription in self.subscriptions_made):
-            return Health(DiagnosticStatus.WARN, "other nodes write its topics too", counters, self._last_stamp)
+            return DiagnosticStatus.WARN, "other nodes write its topics too"
         unmet = self._unmet()
         if unmet:
-            return Health(DiagnosticStatus.WARN, unmet, counters, self._last_stamp)
+            return DiagnosticStatus.WARN, unmet
         state = "active" if self._is_active else "inactive"
-        return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)
+        return DiagnosticStatus.OK, state
 
     def _named(self, topic: str) -> str:
         """A topic, and how to do without it."""

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from css_analysis.fault_record import fault_records
-from css_analysis.flight_log import LOGGED_TYPES, FlightLog
+from css_analysis.flight_log import LOGGED_TYPES, TOLD_TYPES, FlightLog
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
 from css_common.link_kinds import MESSAGES_FAIL, SORTS
@@ -22,7 +21,6 @@ from css_common.schema import unknown_name
 from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_monte_carlo.mission_parts import is_attitude
-from css_msgs.msg import Faults
 
 
 def configured(
@@ -81,7 +79,7 @@ def fly_checked(mission: Mission) -> FlightLog:
     """As `fly_directly`, for a mission that has passed the checks before a flight."""
     steps = max(mission.steps, 1)
     wires: dict[str, _Wire | _Tape] = {
-        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=kind is Faults)
+        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=kind in TOLD_TYPES)
         for topic, kind in mission.topics.items()
     }
     _fly(mission, wires)
@@ -89,9 +87,9 @@ def fly_checked(mission: Mission) -> FlightLog:
     for topic, wire in wires.items():
         if isinstance(wire, _Wire):
             log.add(f"/{topic}", mission.topics[topic], wire.columns())
-    for _, wire in sorted(wires.items()):
+    for topic, wire in sorted(wires.items()):
         if isinstance(wire, _Tape):
-            log.faults += fault_records(wire.samples, mission.epoch_ns)
+            log.tell(f"/{topic}", mission.topics[topic], wire.samples)
     return log
 
 

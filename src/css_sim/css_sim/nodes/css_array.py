@@ -83,6 +83,11 @@ class CssArray(Component):
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return noise_findings(NOISE, node.values, LOUDEST_CELL)
 
+    @property
+    def albedo(self) -> np.ndarray:
+        """Light of the Earth (N,) on the cells in the last cycle [-]."""
+        return self._cells.albedo
+
     def configure(self) -> None:
         values = self.values
         self._key = random_key(values[SEED], values[CASE])
