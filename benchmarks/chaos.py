@@ -35,12 +35,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS), metavar="KIND", help=", ".join(KINDS))
     parser.add_argument("--count", type=int, help="flights of each kind (default: 10, 20 or 100)")
+    parser.add_argument("--faulted", action="store_true", help="in flights with faults of sensors, a wheel, messages")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the counts here too")
     arguments = parser.parse_args()
     counts: dict[str, dict[str, int]] = {}
     with tempfile.TemporaryDirectory(prefix="sunpoint_chaos_") as folder:
-        reference = flights.Reference(Path(folder))
+        reference = flights.Reference(Path(folder), faulted=arguments.faulted)
         for kind in arguments.kinds:
             fly, usual = KINDS[kind]
             counted: Counter[str] = Counter()

@@ -29,6 +29,21 @@ from css_recording.errors import BagError
 from css_recording.recovery import recover
 
 SECONDS = 60.0
+FAULTS = {
+    "cell": {"time": 8.0, "target": "cell.2", "kind": "stuck", "level": 0.4},
+    "cells": {"time": 12.0, "end": 40.0, "target": "cell.4-5", "kind": "noisy", "sigma": 0.1},
+    "rate": {"time": 5.0, "target": "gyro.y", "kind": "bias", "offset": 0.2},
+    "wheel": {"time": 15.0, "target": "wheel.1", "kind": "friction", "coulomb": 1e-4, "viscous": 1e-6},
+    "voltages": {"time": 10.0, "end": 50.0, "target": "message.css/voltages", "kind": "dropped", "share": 0.05},
+    "commands": {
+        "time": 10.0,
+        "end": 50.0,
+        "target": "message.wheels/torque_command",
+        "kind": "dropped",
+        "share": 0.05,
+    },
+}
+"""Faults in whose middle processes are harmed; none that hangs on what a process remembers."""
 _ANSWERS_ALIKE = ("css_array", "gyro")  # nodes without a memory: restarted, they say what they would have said
 _PATIENCE = 120.0  # wall time [s] for a process flight to end
 
@@ -77,10 +92,13 @@ class Outcome:
 class Reference:
     """The undisturbed flight."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, faulted: bool = False) -> None:
+        """Flies it; `faulted`: with faults of sensors, a wheel and messages."""
         parameters = load_mission("okeefe_2013", [f"mission.duration={SECONDS}"]).parameters
         # a minute is too short for its criteria
         shared = {key: value for key, value in parameters["/**"].items() if not key.startswith("criteria.")}
+        if faulted:
+            shared |= {f"faults.{name}.{key}": value for name, entry in FAULTS.items() for key, value in entry.items()}
         self.file = folder / "okeefe_2013.yaml"
         self.file.write_text(dump_sections({**parameters, "/**": shared}), encoding="utf-8")
         self.mission: Mission = load_mission(self.file)
@@ -88,12 +106,14 @@ class Reference:
         with own_domain(self.mission, None, bag, console), ComposedFlight(self.mission, bag) as flight:
             result = flight.fly()
         assert not result.failure, result.failure
-        assert not result.notes, result.notes
+        assert faulted or not result.notes, result.notes
+        self.notes = result.notes
         self.messages = messages_of(bag)
 
     def judge(self, result: FlightResult, logs: Path, *, alike: bool) -> Outcome:
         """What a flight in this process came to; `alike`: it must equal the undisturbed one to the last bit."""
-        said = bool(result.failure or result.notes)
+        # what faults leave to be said is said of every flight with them
+        said = bool(result.failure) or any(note not in self.notes for note in result.notes)
         outcome = Outcome(int(said), said, lost=result.messages_lost)
         outcome.tracebacks = sum("Traceback" in log.read_text(errors="replace") for log in logs.glob("*.log"))
         if result.bag is None or not any(result.bag.glob("*.mcap")):
@@ -104,7 +124,9 @@ class Reference:
             recover(result.bag)
             outcome.recovered = True
             found = messages_of(result.bag)
-        pairs = [(found.get(topic, []), expected) for topic, expected in self.messages.items()]
+        # a node that is started again tells its faults once more
+        alike_on = {topic: told for topic, told in self.messages.items() if not topic.startswith("/faults/")}
+        pairs = [(found.get(topic, []), expected) for topic, expected in alike_on.items()]
         same = all(recorded == expected for recorded, expected in pairs)
         begun = all(recorded == expected[: len(recorded)] for recorded, expected in pairs)
         outcome.wrong = (alike and not begun) or (not said and not same)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from faults import every_kind
+from faults import FLOWN, every_kind
 from flights import fly_composed, messages_by_topic
 from listing import ROOT
 
@@ -16,14 +16,13 @@ from css_analysis.flight_log import read_flight
 from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_bringup.verbs.fly import conclude
+from css_common.case_faults import NEVER
 from css_common.codec import codec_of
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
 from css_common.preflight import preflight
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.direct_flight import fly_and_keep, fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
-from css_sim import fault_effects as effects
-from css_sim.fault_kinds import KINDS
 
 CASE = 4
 DURATION = 20.0
@@ -99,7 +98,7 @@ def test_the_estimator_gives_the_bytes_that_flew(flown, tmp_path):
 
 def test_each_fault_is_told_from_its_begin_to_its_end(mission, flown):
     log = read_flight(flown)
-    assert len(mission.faults) == len(KINDS)
+    assert len(mission.faults) == len(FLOWN)
     told = {(f.target, f.kind, round(f.begin_s, 6)): f for f in log.faults}
     for said in mission.faults:
         target, kind, *words = said.line.split()
@@ -114,7 +113,9 @@ def test_each_fault_is_told_from_its_begin_to_its_end(mission, flown):
                 values = [float(word) for word in words[: words.index("from")]]
                 assert [value for value, _ in record.values.values()] == values
     assert told == {}
-    assert log.faults == fly_directly(mission).faults
+    directly = fly_directly(mission)
+    assert log.faults == directly.faults
+    assert log.health == directly.health
 
 
 def test_a_switched_sensor_forgets_where_it_froze_and_other_changes_do_not():
@@ -141,7 +142,7 @@ def test_cases_of_a_study_draw_their_own_faults():
     flight = MissionFlight(mission)
     cases, _ = flight.cases(np.arange(40))
     rows = cases.faults[:, 0]
-    acting = rows["first_step"] < effects.NEVER
+    acting = rows["first_step"] < NEVER
     assert 8 < np.count_nonzero(acting) < 32
     assert set(rows["unit"][acting]) == {0, 1, 2, 3}
     assert np.all((rows["first_step"][acting] >= 10) & (rows["first_step"][acting] <= 60))
@@ -192,6 +193,15 @@ def test_wrong_entries_are_refused_with_what_would_be_right(text):
 def test_a_fault_that_never_comes_is_named():
     (line,) = preflight(mission_with(entry("time: 500.0, target: cell.1, kind: dead")))
     assert line == "fault one at 500 s never comes, the last step is at 19.9 s"
+
+
+def test_a_value_of_an_entry_has_the_bounds_of_what_fails():
+    """A level of 20000 is one of a field in nT, and of no wheel in N m."""
+    mission = mission_with(entry("time: 2.0, target: magnetometer.x, kind: stuck, level: 1.0"))
+    (changed,) = mission.with_overrides(["faults.one.level=20000"]).faults
+    assert changed.line.startswith("magnetometer.x stuck 20000 ")
+    with pytest.raises(MissionError, match=r"faults.one.level: 2000000.0 given, expected at least -1e\+06 and at most"):
+        mission.with_overrides(["faults.one.level=2e6"])
 
 
 def test_the_faults_of_the_readme_are_valid():

@@ -108,5 +108,5 @@ def test_an_orbit_is_asked_for_by_those_who_ask_a_model():
 def test_a_node_by_itself_asks_when_it_has_its_parameters(kind):
     mission = mission_of_arguments(kind, [])
     node = mission.node_of(kind, kind.__name__.lower())
-    assert "missing" in present(conflict(kind, node.canonical))
+    assert "missing" in present(conflict(kind, node.canonical, node.name))
     assert preflight(mission, kind) == []

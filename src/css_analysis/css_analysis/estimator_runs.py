@@ -4,6 +4,8 @@
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
+
 from css_analysis.flight_log import FlightLog
 from css_analysis.flight_metrics import EstimatorMeasures, FlightMeasures
 from css_analysis.quantities import flight_quantities
@@ -12,7 +14,7 @@ Run = dict[str, Any]
 
 
 def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: str | None = None) -> list[Run]:
-    """One dictionary for each estimator: its name, gyro, flown and `quantities.flight_quantities`.
+    """One dictionary for each estimator: its name, gyro, flown, `quantities.flight_quantities`, isolated cells.
 
     Convergence, pointing errors and final rate belong to the flight: an estimator that was replayed or flew beside has
     those of the one that controlled.
@@ -29,9 +31,18 @@ def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: st
             "gyro": "on" if log.uses_gyro(name) else "off",
             "flown": name == flown,
             **_measured(EstimatorMeasures(flight, name)),
+            "isolated_cells": _isolated_cells(log, name),
         }
         for name in ((*log.estimates, *log.attitudes) if names is None else names)
     ]
+
+
+def _isolated_cells(log: FlightLog, name: str) -> list[int]:
+    """Numbers of the cells that an estimator left out at some time for failed."""
+    if name not in log.estimates:
+        return []
+    ever = int(np.bitwise_or.reduce(log.estimates[name].isolated))
+    return [i for i in range(32) if ever >> i & 1]
 
 
 def _measured(estimator: EstimatorMeasures) -> Run:

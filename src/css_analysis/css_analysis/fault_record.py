@@ -4,11 +4,16 @@
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+from css_common import link_kinds
+from css_common.case_faults import NEVER, CaseFault
 from css_common.codec import Sample
+from css_common.fault_lines import Units
 from css_sim.fault_kinds import AXES, KINDS, SORTS
 
-_KINDS = {(SORTS[kind.sort], kind.code): kind for kind in KINDS}
-_SORTS = {code: name for name, code in SORTS.items()}
+_CODES = {**SORTS, **link_kinds.SORTS}
+_KINDS = {(_CODES[kind.sort], kind.code): kind for kind in (*KINDS, *link_kinds.KINDS)}
+_SORTS = {code: name for name, code in _CODES.items()}
+_AXES: Units = {"gyro": AXES, "magnetometer": AXES}
 
 
 class FaultRecord(NamedTuple):
@@ -37,8 +42,15 @@ class FaultRecord(NamedTuple):
         return f"{self.target} {self.kind}{values}, from {self.begin_s:g}{until}"
 
 
-def fault_records(told: Iterable[Sample], epoch_ns: int) -> list[FaultRecord]:
-    """The faults of messages `Faults` of one node, in the order of their stamps."""
+def fault_records(told: Iterable[Sample], epoch_ns: int, names: Units | None = None) -> list[FaultRecord]:
+    """The faults of messages `Faults` of one node, in the order of their stamps.
+
+    Args:
+        told: the messages.
+        epoch_ns: stamp from which times count.
+        names: of units that have more than a number, by their sort.
+    """
+    known = {**_AXES, **(names or {})}
     records: list[FaultRecord] = []
     acting: dict[tuple, int] = {}
     for message in told:
@@ -51,8 +63,21 @@ def fault_records(told: Iterable[Sample], epoch_ns: int) -> list[FaultRecord]:
         for fault in faults:
             if fault not in acting:
                 acting[fault] = len(records)
-                records.append(_record(fault, now_s))
+                records.append(_record(fault, now_s, known))
     return records
+
+
+def case_record(fault: CaseFault, period_s: float, names: Units) -> FaultRecord:
+    """A fault of a case as its flight would tell it.
+
+    Args:
+        fault: which begins at some time.
+        period_s: control cycle [s].
+        names: of the units of its node, by their sort.
+    """
+    told = (fault.sort, fault.unit, fault.kind, *fault.values)
+    record = _record(told, fault.first_step * period_s, names)
+    return record._replace(end_s=None if fault.end_step >= NEVER else fault.end_step * period_s)
 
 
 def _faults_of(message: Sample) -> Iterator[tuple]:
@@ -62,12 +87,12 @@ def _faults_of(message: Sample) -> Iterator[tuple]:
         yield (*unit, *row)
 
 
-def _record(fault: tuple, now_s: float) -> FaultRecord:
+def _record(fault: tuple, now_s: float, names: Units) -> FaultRecord:
     sort, unit, code, *values = fault
     kind = _KINDS.get((sort, code))
     sort_name = _SORTS.get(sort, f"unit of sort {sort}")
-    axes = sort_name in ("gyro", "magnetometer") and unit < len(AXES)
-    target = f"{sort_name}.{AXES[unit] if axes else unit}"
+    of_sort = names.get(sort_name, ())
+    target = f"{sort_name}.{of_sort[unit] if unit < len(of_sort) else unit}"
     if kind is None:
         return FaultRecord(target, f"fault {code}", {}, now_s, None)
     named = zip(kind.values, values, strict=False)

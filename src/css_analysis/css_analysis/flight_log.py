@@ -7,7 +7,7 @@ carry Sunpoint's types. Nothing is required: without truth there are no errors t
 modes.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,9 +15,12 @@ from pathlib import Path
 import numpy as np
 
 from css_analysis.fault_record import FaultRecord, fault_records
+from css_analysis.health_record import HealthRecord, health_records
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Codec, DecodeError, Sample, codec_of, type_name
+from css_common.fault_lines import Units
 from css_common.kernel import kernel
+from css_common.link import is_gap
 from css_common.message_columns import Columns, stack
 from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
@@ -27,6 +30,7 @@ from css_msgs.msg import (
     ControlStatus,
     CssVoltages,
     Faults,
+    Health,
     RodDipoleCommand,
     SpacecraftState,
     SunEstimate,
@@ -58,6 +62,8 @@ LOGGED_TYPES: dict[str, type] = {
     f"css_msgs/msg/{kind.__name__}": kind for kind in (*_ESTIMATES, *(kind for kind, _ in _SINGLE.values()))
 }
 """Messages that a log holds, type name to class."""
+TOLD_TYPES: tuple[type, ...] = (Faults, Health)
+"""Messages about units that fail, sent when something changes."""
 _ARRAY_NORMAL = next(p for p in SPACECRAFT if p.name == "spacecraft.array_normal")
 
 
@@ -93,6 +99,7 @@ class FlightLog:
         voltages, wheels, torque_command, rod_command, control: columns of the topic, None when there is none.
         true_wheels: `WheelState` columns with the true speeds, None where those reported are true.
         faults: those that sensors and actuators told of, node by node.
+        health: units that estimators and control held for failed, node by node.
         notes: what could not be read, one line each.
         imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
             arrays of its mission are unknown.
@@ -110,6 +117,7 @@ class FlightLog:
     control: Columns | None = None
     true_wheels: Columns | None = None
     faults: list[FaultRecord] = field(default_factory=list)
+    health: list[HealthRecord] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     imported: bool = False
 
@@ -141,6 +149,13 @@ class FlightLog:
                 self.notes.append(f"of several topics with {kind.__name__} one is taken, {usual} if it is there")
             if not taken or topic == usual:
                 setattr(self, attribute, columns)
+
+    def tell(self, topic: str, message_type: type, told: Iterable[Sample]) -> None:
+        """Take the messages of a topic that tells of units that fail, of one of `TOLD_TYPES`."""
+        if message_type is Faults:
+            self.faults += fault_records(told, self.epoch_ns, _names_on(topic, self.mission))
+        elif message_type is Health:
+            self.health += health_records(topic.rpartition("/")[2], told, self.epoch_ns)
 
     @cached_property
     def epoch_ns(self) -> int:
@@ -262,10 +277,10 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         messages: dict[str, tuple[type, list[bytes]]] = {
             topic.name: (LOGGED_TYPES[topic.type], []) for topic, _ in reader.topics if topic.type in LOGGED_TYPES
         }
-        told = {topic.name for topic, _ in reader.topics if topic.type == type_name(Faults)}
+        told = {topic.name: kind for topic, _ in reader.topics for kind in TOLD_TYPES if topic.type == type_name(kind)}
         if not messages:
             raise BagError(f"{path}: holds no truth, estimate, cell output, wheel or control message")
-        messages |= {name: (Faults, []) for name in told}
+        messages |= {name: (kind, []) for name, kind in told.items()}
         append = {topic: received.append for topic, (_, received) in messages.items()}
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
@@ -273,10 +288,22 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
     log = FlightLog(str(path), mission, notes=notes, imported=imported)
     for topic, (message_type, received) in messages.items():
         if topic not in told:
-            log.add(topic, message_type, _whole(topic, codec_of(message_type), received, notes).sorted())
-    for topic in sorted(told):
-        log.faults += fault_records(_each_whole(topic, codec_of(Faults), messages[topic][1], notes), log.epoch_ns)
+            log.add(topic, message_type, _whole(topic, codec_of(message_type), _came(received), notes).sorted())
+    for topic, kind in sorted(told.items()):
+        log.tell(topic, kind, _each_whole(topic, codec_of(kind), messages[topic][1], notes))
     return log
+
+
+def _names_on(topic: str, mission: Mission | None) -> Units:
+    """Names of the units of the node that tells its faults on a topic, as far as the mission has it."""
+    nodes = () if mission is None else mission.nodes
+    return next((node.host.units for node in nodes if topic.startswith(f"/faults/{node.name}/")), {})
+
+
+def _came(received: list[bytes]) -> list[bytes]:
+    """Messages without those that say that there is none, and without second copies."""
+    pairs = zip(received, [b"", *received], strict=False)
+    return [data for data, before in pairs if data != before and not is_gap(data)]
 
 
 def _whole(topic: str, codec: Codec, received: list[bytes], notes: list[str]) -> Columns:

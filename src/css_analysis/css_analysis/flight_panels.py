@@ -20,6 +20,7 @@ from css_analysis.figure_style import (
     shade_dark,
 )
 from css_analysis.flight_log import FlightLog
+from css_analysis.health_panel import draw_health, has_spells
 from css_common.message_columns import Columns
 from css_msgs.msg import ControlStatus, SunEstimate
 
@@ -173,6 +174,11 @@ def _control_mode(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     axes.set_ylim(-0.5, len(_MODES) - 0.5)
 
 
+def _health(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
+    draw_health(axes, log, unit.scale, unit.last)
+    legend(axes, title="held for failed by")
+
+
 class Panel(NamedTuple):
     """One set of axes."""
 
@@ -190,6 +196,8 @@ _CONTROL_MODE = Panel("control_mode", "Control mode", 0.8, _control_mode)
 _WHEEL_SPEED = Panel("wheel_speed", "Wheel speed", 1.0, _wheel_speed)
 _CELL_OUTPUT = Panel("cell_output", "Cell output", 1.2, _cell_output)
 
+_HEALTH = Panel("health", "Units that fail, and that are held for failed", 1.0, _health)
+
 
 def panels_of(log: FlightLog) -> list[Panel]:
     """The panels for which the flight has data, from top to bottom."""
@@ -202,5 +210,6 @@ def panels_of(log: FlightLog) -> list[Panel]:
         _CONTROL_MODE: log.control is not None,
         _WHEEL_SPEED: log.wheels is not None,
         _CELL_OUTPUT: log.voltages is not None,
+        _HEALTH: has_spells(log),
     }
     return [panel for panel, has_data in chosen.items() if has_data]

@@ -41,6 +41,17 @@ def _columns_of(runs: Sequence[Run]) -> list[Quantity]:
     return [quantity for quantity in asked_for if not quantity.name.startswith("attitude")]
 
 
+def isolated_lines(runs: Iterable[Run]) -> list[str]:
+    """A line for each run that left out cells for failed."""
+    return [_isolated_line(run) for run in runs if run.get("isolated_cells")]
+
+
+def _isolated_line(run: Run) -> str:
+    cells, flown = run["isolated_cells"], " (flown)" if run["flown"] else ""
+    numbers = f"{'cell' if len(cells) == 1 else 'cells'} {', '.join(map(str, cells))}"
+    return f"{run['estimator']}{flown} left out {numbers} for failed, for some time or all"
+
+
 class Verdict(NamedTuple):
     """What became of one limit of one criterion."""
 

@@ -7,10 +7,12 @@ README come from it.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from css_analysis import fault_sums
+from css_analysis.fault_sums import CELLS, RODS, SENSORS, WHEELS
 from css_analysis.flight_metrics import EstimatorMeasures, Windows
 
 
@@ -21,6 +23,7 @@ class CaseSums(NamedTuple):
     histogram: np.ndarray  # (C, bins) heading errors after acquisition, or attitude errors once settled
     bin_deg: float
     period_s: float
+    health: Any = None  # `HealthTallies` of `css_monte_carlo.health_tallies`; None of attitude filters
 
 
 @dataclass(frozen=True)
@@ -384,6 +387,55 @@ _REST = (
 )
 
 
+def _isolated(name: str, description: str, *sorts: int) -> Quantity:
+    return _counted(name, description, lambda sums: fault_sums.isolated_units(sums.health, *sorts))
+
+
+def _wrong(name: str, description: str, *sorts: int) -> Quantity:
+    return _counted(name, description, lambda sums: fault_sums.false_isolations(sums.health, *sorts))
+
+
+def _counted(name: str, description: str, count: Callable[[CaseSums], np.ndarray]) -> Quantity:
+    return Quantity(name, "", description, tally=count, whole=True)
+
+
+_FAULTS = (
+    Quantity(
+        "fault_shown_s",
+        "s",
+        "time since the epoch at which the first fault shows: that of a cell when its reading is off by more than "
+        "5 sigma of its noise, losses, calibration and 0.4 of the light of the Earth on it; that of other units when "
+        "it begins",
+        tally=lambda sums: fault_sums.shown_s(sums.health, sums.period_s),
+    ),
+    Quantity(
+        "detected_s",
+        "s",
+        "longest time from a fault that shows to the isolation of its unit; null while one of them is not isolated",
+        tally=lambda sums: fault_sums.detected_s(sums.health, sums.period_s),
+    ),
+    Quantity(
+        "undetected_units",
+        "",
+        "units whose fault showed and that were not isolated while it acted",
+        tally=lambda sums: fault_sums.undetected_units(sums.health),
+        whole=True,
+    ),
+    _counted(
+        "misnamed_units",
+        "failed cells that were isolated and last taken for what they are not; kinds that no reading tells apart are "
+        "one",
+        lambda sums: fault_sums.misnamed_units(sums.health),
+    ),
+    _isolated("isolated_cells", "different cells that were ever isolated", CELLS),
+    _isolated("isolated_actuators", "different wheels and torque rods that were ever isolated", WHEELS, RODS),
+    _isolated("left_sensors", "gyro and magnetometer: how many of them were ever left out for failed", SENSORS),
+    _wrong("false_isolations", "isolations of a cell that began while no fault acted on it", CELLS),
+    _wrong("false_actuator_isolations", "the same of wheels and torque rods", WHEELS, RODS),
+    _wrong("falsely_left_sensors", "the same of gyro and magnetometer", SENSORS),
+)
+
+
 def quantities(windows: Windows) -> tuple[Quantity, ...]:
     """All quantities in the order of tables, those of windows that a mission does not ask for left out."""
     return (
@@ -399,6 +451,7 @@ def quantities(windows: Windows) -> tuple[Quantity, ...]:
         _RATE_FINAL,
         *(_reported(windows.report_time) if windows.report_time > 0.0 else ()),
         *_REST,
+        *_FAULTS,
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from css_common.attitude import mrp_to_dcm, quaternion_to_mrp
 from css_common.codec import Sample, codec_of, type_name
 from css_common.epochs import mission_epoch
+from css_common.link import is_gap
 from css_common.mission import Mission, mission_from_text
 from css_common.schema import Values
 from css_estimation.spin.coning import Passages
@@ -66,7 +67,8 @@ def read_spinning(bag: Path) -> SpinFlight | None:
         samples: dict[type, list[Sample]] = {kind: [] for kind in TYPES}
         for message in reader.messages(topics):
             kind = topics[message.topic]
-            samples[kind].append(codec_of(kind).decode(message.data))
+            if not is_gap(message.data):
+                samples[kind].append(codec_of(kind).decode(message.data))
         return spin_flight(mission_from_text(text, f"{bag}: mission"), samples)
 
 

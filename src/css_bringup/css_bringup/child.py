@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO
 
-from css_common.supervised import duties
+from css_common.security import of_process
+from css_common.supervised import announced, duties
 
 _STOPPED = "T"
 _TRACED = "t"
@@ -26,12 +27,14 @@ class Pulse:
         source: descriptor of the pipe into which it writes once a second from the loop that runs its callbacks.
         silent_s: for how long it has written nothing, counted from its first word on [s].
         stopped_s: for how long it has been stopped by a signal [s].
+        announced: faults of its own that it has told beforehand.
     """
 
     pid: int
     source: int
     silent_s: float = 0.0
     stopped_s: float = 0.0
+    announced: list[str] = field(default_factory=list)
     _heard: bool = False
 
     def look(self, elapsed_s: float) -> None:
@@ -57,9 +60,10 @@ class Pulse:
 
     def _beats(self) -> bool:
         with contextlib.suppress(BlockingIOError):
-            beats = bool(os.read(self.source, 4096))
-            self._heard = self._heard or beats
-            return beats
+            beats = os.read(self.source, 65536)
+            self.announced += announced(beats)
+            self._heard = self._heard or bool(beats)
+            return bool(beats)
         return False
 
     def _state(self) -> str:
@@ -82,6 +86,7 @@ class Child:
     pulse: Pulse | None = None
     deaths: list[float] = field(default_factory=list)
     asked_to_end: bool = False
+    done: list[str] = field(default_factory=list)
 
     def start(self) -> int:
         """Starts the process, whose number it returns; its log begins anew with the flight and survives a restart."""
@@ -89,11 +94,12 @@ class Child:
         self.stream = self.log.open("wb" if self.process is None else "ab")
         source, beating = os.pipe()
         os.set_blocking(source, False)
+        environment = {**os.environ, **of_process(os.environ, self.name), **duties(beating, self.done)}
         try:
             # its own session: Ctrl-C goes to the supervisor, which stops the nodes in order
             self.process = subprocess.Popen(
                 self.command, stdout=self.stream, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
-                start_new_session=True, pass_fds=(beating,), env={**os.environ, **duties(beating)},
+                start_new_session=True, pass_fds=(beating,), env=environment,
             )  # fmt: skip
         except OSError:
             os.close(source)
@@ -102,6 +108,15 @@ class Child:
             os.close(beating)
         self.pulse = Pulse(self.process.pid, source)
         return self.process.pid
+
+    def announced(self) -> list[str]:
+        """Faults of its own that it has told since the last look, and that are done when it is started again."""
+        if self.pulse is None:
+            return []
+        self.pulse.look(0.0)
+        told, self.pulse.announced = self.pulse.announced, []
+        self.done += told
+        return told
 
     def poll(self) -> int | None:
         """Exit code, or None while it runs."""

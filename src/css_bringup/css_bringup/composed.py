@@ -12,6 +12,7 @@ from css_bringup.flight_result import FlightResult, Progress, Stopped, as_flown
 from css_bringup.incidents import node_incidents
 from css_common.executor import create_executor, retire, spin_about_until, spin_until
 from css_common.host import ComponentNode
+from css_common.link_kinds import PROCESSES_FAIL
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.node_process import create_node
@@ -39,10 +40,11 @@ class ComposedFlight:
             overwrite: replace a recording that is there.
 
         Raises:
-            MissionError: no node of the mission owns simulated time.
+            MissionError: no node of the mission owns simulated time, or it has faults of processes.
         """
         if mission.plant is None:
             raise MissionError(f"{mission.origin}: no node of graph.nodes owns simulated time, nothing can fly")
+        mission.refuse_faults(PROCESSES_FAIL, "process")
         self.mission = mission
         self.bag = bag
         self._plant_name = mission.plant.name

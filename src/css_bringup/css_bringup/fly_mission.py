@@ -14,7 +14,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 from css_bringup.composed import ComposedFlight
 from css_bringup.flight_result import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
-from css_common import domains, network, places
+from css_common import domains, network, places, security
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_common.progress_lines import ProgressLines, still_working
@@ -34,7 +34,9 @@ def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: C
     Raises:
         NetworkError: the number is none.
         DomainError: another flight has the domain, or there is no free one.
+        SecurityError: the environment asks for security, and the middleware has none.
     """
+    security.check(os.environ)
     recording = str(bag.absolute()) if bag else ""
     with domains.own(os.environ, mission.name, recording=recording, asked=asked) as held:
         before = {name: os.environ.pop(name, None) for name in (network.DOMAIN, domains.JOINED)}

@@ -14,6 +14,7 @@ _OF_ANY_NODE = {
     "events_refused": "{} scripted events refused",
     "deadline_missed": "{} cycles without an optional input that was silent",
     "time_set_back": "began anew {} times because time was set back",
+    "skipped": "{} cycles that there were not, because a message that they need did not come",
     "unmatched": "{} messages that no cycle used, because what belongs to them did not come",
 }
 _OF_THE_PLANT = {

@@ -12,6 +12,7 @@ from css_common import command
 from css_common.domains import DomainError
 from css_common.mission_file import MissionError
 from css_common.network import NetworkError
+from css_common.security import SecurityError
 from css_recording.errors import BagError
 
 # without markup: units, paths and what people type may hold brackets
@@ -40,6 +41,13 @@ def add_domain_option(parser: argparse.ArgumentParser) -> None:
     """Where a flight has its world for itself."""
     parser.add_argument(
         "--domain", metavar="N", help="ROS domain to fly in (default: ROS_DOMAIN_ID when set, else a free one)"
+    )
+
+
+def add_security_option(parser: argparse.ArgumentParser) -> None:
+    """Whose messages a flight takes."""
+    parser.add_argument(
+        "--security", type=Path, metavar="KEYSTORE", help="fly with DDS security enforced, by this keystore of SROS 2"
     )
 
 
@@ -78,4 +86,6 @@ def guarded(prog: str, run: Callable[[], int], failed: tuple[type[Exception], ..
         run: does the work and gives an exit code.
         failed: errors that become one line and exit code 1.
     """
-    return command.guarded(prog, run, (MissionError, BagError, FiguresError, DomainError, NetworkError), failed)
+    return command.guarded(
+        prog, run, (MissionError, BagError, FiguresError, DomainError, NetworkError, SecurityError), failed
+    )

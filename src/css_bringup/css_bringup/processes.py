@@ -172,7 +172,11 @@ class Supervisor:
     def _replace(self, child: Child, what: str) -> bool:
         """Starts a process anew that died or froze; False when that cannot help."""
         now = time.monotonic()
-        child.deaths.append(now)
+        meant = child.announced()
+        if meant:
+            what = f"{what}, as its fault {meant[-1]!r} says,"
+        else:
+            child.deaths.append(now)
         if child is self.plant:
             return self._fail(child, what, "the spacecraft's state is lost with it")
         if child is self.recorder:

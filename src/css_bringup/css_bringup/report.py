@@ -9,7 +9,7 @@ from typing import Any
 from rich.console import Console
 
 from css_analysis.estimator_runs import Run
-from css_analysis.flight_summary import Verdict, criteria_failures, criteria_verdicts, summary_table
+from css_analysis.flight_summary import Verdict, criteria_failures, criteria_verdicts, isolated_lines, summary_table
 from css_bringup.flight_result import FlightResult
 from css_bringup.options import complain
 from css_common.mission import Mission
@@ -69,6 +69,8 @@ def print_result(console: Console, result: FlightResult, runs: Sequence[Run]) ->
     """The table and the figures of the flight."""
     if runs:
         console.print(summary_table(runs))
+    for line in isolated_lines(runs):
+        console.print(line, soft_wrap=True, highlight=False)
     for verdict in verdicts(result, runs):
         console.print(verdict.line(), style="" if verdict.passed else "red", soft_wrap=True)
     simulated = f"{result.simulated_s:.1f} s simulated"

@@ -15,7 +15,7 @@ import numpy as np
 from css_bringup.comparison import Comparison
 from css_bringup.flight_changes import ParameterChange
 from css_common.codec import Sample
-from css_common.component import Cycles, Received
+from css_common.component import TOLD, Cycles, Received
 from css_common.schema import ParameterError
 from css_common.stepping import Port, Stepper
 
@@ -150,7 +150,8 @@ class Retrace:
 
     def _given(self, stamp_ns: int, received: Received) -> Given:
         stepper = self.stepper
-        return [(p, s, p.codec.encode(s)) for p, s in stepper.checked(stepper.step(stamp_ns, received))]
+        sent = stepper.sent(stamp_ns, stepper.step(stamp_ns, received))
+        return [message for message in sent if message[0].key != TOLD]  # the flight's affair
 
     def _agrees(self, given: Given) -> bool | None:
         """Whether messages are as they flew; None when none of them did."""

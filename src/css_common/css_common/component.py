@@ -12,21 +12,26 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from css_common import fault_lines
+from css_common import fault_lines, link_kinds
 from css_common.codec import Sample
 from css_common.epochs import mission_epoch
 from css_common.fault_lines import FaultKind, Units
+from css_common.link_kinds import LINK_FAULTS
 from css_common.message_columns import Columns
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
 from css_common.sections import DURATION, EPOCH
 from css_common.shared_sections import conflicts, section_table
+from css_msgs.msg import Faults
 
 if TYPE_CHECKING:
     from css_common.mission import Node
 
 BODY = "body"
 INERTIAL = "inertial"
+
+TOLD = "link_faults"
+"""Key of the output on which a host tells the faults of messages, clock and process."""
 
 
 @dataclass(frozen=True)
@@ -152,6 +157,7 @@ class Component:
 
     Attributes:
         report: takes a line for the log; a host makes it the node's.
+        left_out: names of the units that it holds for failed, such as `cell.3`.
 
     Class attributes:
         shared: mission sections whose values the component reads (`shared_sections`), besides mission and io.
@@ -169,11 +175,12 @@ class Component:
         self.name = name
         self.values = values
         self.report: Callable[[str], object] = _unheard
+        self.left_out: tuple[str, ...] = ()
         self.period_ns = round(values.mission.period * 1e9)
         self.epoch_ns = mission_epoch(values.mission)
         self.frames = {
             output.key: values.io.body_frame if output.frame == BODY else values.io.inertial_frame
-            for output in self.outputs(name, values)
+            for output in self.all_outputs(name, values)
         }
         self.configure()
 
@@ -194,6 +201,12 @@ class Component:
         return ()
 
     @classmethod
+    def all_outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
+        """Topics that it and its host publish."""
+        told = (Output(TOLD, f"faults/{name}/link", Faults, events=True),) if values[LINK_FAULTS] else ()
+        return (*cls.outputs(name, values), *told)
+
+    @classmethod
     def needed(cls, values: Values) -> Iterable[str]:
         """Names of parameters without a default that it cannot do without; they have an example in their table."""
         return ()
@@ -212,6 +225,11 @@ class Component:
     def fault_units(cls, values: Values) -> Units:
         """Names of the units that may have the faults of `fault_kinds`, by their sort."""
         return {}
+
+    @classmethod
+    def link_units(cls, name: str, values: Values) -> Units:
+        """Names of what may fail of any node, its messages, clock and process, by their sort (`link_kinds`)."""
+        return link_kinds.units(name, cls.outputs(name, values), issubclass(cls, Plant))
 
     @classmethod
     def preflight(cls, node: "Node", graph: Mapping[str, "Node"]) -> Iterable[Finding]:
@@ -299,7 +317,7 @@ def missing_values(component_type: type[Component], values: Values) -> Iterator[
     return missing(component_type.table(), values, component_type.asked_for(values))
 
 
-def all_conflicts(component_type: type[Component], values: Values) -> Iterator[str]:
+def all_conflicts(component_type: type[Component], values: Values, name: str) -> Iterator[str]:
     """What is wrong between the values of a component; what is missing comes first, for the rest builds on it."""
     yield from missing_values(component_type, values)
     yield from conflicts(values)
@@ -307,4 +325,7 @@ def all_conflicts(component_type: type[Component], values: Values) -> Iterator[s
         yield from fault_lines.conflicts(
             values[fault_lines.FAULTS], component_type.fault_kinds, component_type.fault_units(values)
         )
+    if values[LINK_FAULTS]:
+        units = component_type.link_units(name, values)
+        yield from fault_lines.conflicts(values[LINK_FAULTS], link_kinds.KINDS, units, LINK_FAULTS.name)
     yield from component_type.conflicts(values)

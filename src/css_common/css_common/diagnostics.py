@@ -21,12 +21,14 @@ class Health(NamedTuple):
         message: one line.
         counters: what it has counted since its start.
         stamp_ns: simulated time of its last cycle [ns since 1970 UTC].
+        left_out: names of the units that it holds for failed.
     """
 
     level: bytes
     message: str
     counters: Mapping[str, int]
     stamp_ns: int
+    left_out: tuple[str, ...] = ()
 
 
 class Diagnostics:
@@ -46,7 +48,7 @@ class Diagnostics:
 
     def _publish(self) -> None:
         beat()
-        level, message, counters, stamp_ns = self._health()
+        level, message, counters, stamp_ns, left_out = self._health()
         array = DiagnosticArray()
         array.header.stamp.sec, array.header.stamp.nanosec = divmod(stamp_ns, 1_000_000_000)
         array.status = [
@@ -55,7 +57,10 @@ class Diagnostics:
                 name=self._node.get_fully_qualified_name(),
                 message=message,
                 hardware_id="",
-                values=[KeyValue(key=key, value=str(value)) for key, value in counters.items()],
+                values=[
+                    *(KeyValue(key=key, value=str(value)) for key, value in counters.items()),
+                    *([KeyValue(key="left_out", value=", ".join(left_out))] if left_out else []),
+                ],
             )
         ]
         self._publisher.publish(array)

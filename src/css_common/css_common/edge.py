@@ -11,6 +11,7 @@ import numpy as np
 
 from css_common.codec import DecodeError, Sample, codec_of
 from css_common.component import INERTIAL, Input
+from css_common.link import GAP
 from css_common.message_columns import Columns, stack_alike
 from css_common.readings import ReadingCheck
 from css_common.schema import Values
@@ -116,12 +117,14 @@ class Edge:
         return {f"{check.name}.{kind}": count for check in self._checks for kind, count in check.counts.items()}
 
     def accept(self, data: bytes) -> Sample | None:
-        """The message in `data`, or None when it was rejected."""
+        """The message in `data`, or None when it was rejected; a gap passes, whatever its stamp."""
         try:
             sample = self.codec.decode(data)
         except DecodeError as error:
             self._reject("malformed", str(error))
             return None
+        if sample.frame_id == GAP:
+            return sample
         refusal = self._refusal(sample)
         if refusal is not None:
             self._incomplete.clear()

@@ -12,7 +12,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
-from css_common import network, supervised
+from css_common import network, security, supervised
 from css_common.command import plain_interrupts
 
 _USAGE = 2
@@ -48,13 +48,14 @@ def _module(executable: Path) -> ModuleType:
 
 
 def _settle_network(module: str) -> bool:
-    """Keeps ROS on this machine; False, with one line, when the environment names a network or domain that is none."""
+    """Keeps ROS on this machine; False, with one line, when the environment asks for what is not to be had."""
     name = module.rpartition(".")[2]
     try:
         note = network.stay_on_this_machine(os.environ)
         if ".nodes." in module and not {"-h", "--help"}.intersection(sys.argv[1:]):
             network.domain_of(os.environ)  # a command that flies holds a domain, and asks itself
-    except network.NetworkError as error:
+            security.check(os.environ)  # as it does for security
+    except (network.NetworkError, security.SecurityError) as error:
         print(f"{name}: {error}", file=sys.stderr)
         return False
     if note:

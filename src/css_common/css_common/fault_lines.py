@@ -22,6 +22,8 @@ FAULTS = replace(
 
 ANY = "any"
 ALL = "all"
+NAMED_APART = ("message", "clock", "process")
+"""Sorts of which every node has units, and no two nodes one of the same name."""
 SECTION = "faults."
 """Beginning of the keys of a mission's entries."""
 
@@ -118,14 +120,14 @@ def _digits(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def conflicts(lines: list[str], kinds: Iterable[FaultKind], units: Units) -> Iterable[str]:
-    """What is wrong with the lines of a node, one message each."""
+def conflicts(lines: list[str], kinds: Iterable[FaultKind], units: Units, name: str = "faults") -> Iterable[str]:
+    """What is wrong with the lines of a node's parameter, one message each."""
     kinds = tuple(kinds)
     for line in lines:
         try:
             parse_line(line, kinds, units)
         except ValueError as error:
-            yield f"faults: {error}"
+            yield f"{name}: {error}"
 
 
 def _pairs(words: Sequence[str]) -> Iterable[tuple[str, str]]:
@@ -243,17 +245,23 @@ def _entry(name: str, given: Mapping[str, Any], hosts: Mapping[str, Host]) -> En
 
 def _node_of(target: str, hosts: Mapping[str, Host], where: str) -> tuple[str, str]:
     """The node that has a target, and the target there: `NODE/SORT.UNIT`, or `SORT.UNIT` where one node has it."""
-    node, slash, rest = target.partition("/")
-    sort = (rest if slash else target).partition(".")[0]
+    sort, _, unit = target.partition(".")
     having = [name for name, host in hosts.items() if sort in host.units]
-    if slash and node in having:
+    known = [name for name in having if unit in hosts[name].units[sort]]
+    if len(having) == 1 or len(known) == 1:
+        return (known or having)[0], target
+    node, slash, rest = target.partition("/")
+    if slash and node in hosts and rest.partition(".")[0] in hosts[node].units:
         return node, rest
-    if not slash and len(having) == 1:
-        return having[0], target
-    if not slash and having:
+    if having and sort in NAMED_APART and unit not in (ALL, ANY):
+        names = [name for host in having for name in hosts[host].units[sort]]
+        expected = ", ".join(f"{sort}.{name}" for name in names)
+        raise ParameterError(f"{where}.target: {shown(target)} given, which does not fly; expected {expected}")
+    if having:
         expected = ", ".join(f"{name}/{target}" for name in having)
         raise ParameterError(f"{where}.target: {shown(target)} given, which several nodes have; expected {expected}")
     flown = {f"{name}/{s}" if slash else s: names for name, host in hosts.items() for s, names in host.units.items()}
+    flown = {s: names for s, names in flown.items() if s.rpartition("/")[2] not in NAMED_APART}
     raise ParameterError(f"{where}.target: {shown(target)} given, which does not fly; expected {_targets(flown)}")
 
 
@@ -262,5 +270,11 @@ def entry_parameter(key: str, hosts: Iterable[Host]) -> Parameter[Any] | None:
     if not key.startswith(SECTION) or key.count(".") != 2:
         return None
     field = key.rpartition(".")[2]
-    values = (v.parameter for host in hosts for kind in host.kinds for v in kind.values)
+    # several sorts have values of a name, within bounds of their own: those are checked with the entry
+    values = (
+        replace(v.parameter, unit="", low=None, high=None, open_low=False)
+        for host in hosts
+        for kind in host.kinds
+        for v in kind.values
+    )
     return next((replace(p, name=key) for p in (*ENTRY, *values) if p.name == field), None)

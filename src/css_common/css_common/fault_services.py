@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Services of a node with faulty units: they change its parameter `faults`, the one place where its faults stand."""
+"""Services for the faults of a node: they change its parameters `faults` and `io.faults`, where all of them stand."""
 
 import math
 from typing import TYPE_CHECKING, Any
 
 from rclpy.parameter import Parameter as RosParameter
 
-from css_common.fault_lines import FAULTS, line_of, parse_line
+from css_common import link_kinds
+from css_common.fault_lines import FAULTS, Host, line_of, parse_line
+from css_common.link_kinds import LINK_FAULTS
 from css_common.schema import shaped_values, shown
 from css_msgs.srv import ClearFault, InjectFault
 
@@ -25,7 +27,8 @@ class FaultServices:
     def _inject(self, request: Any, response: Any) -> Any:
         try:
             line = self._line(request)
-            response.message = self._set([*self._lines(), line])
+            name = link_kinds.parameter_of(line.partition(".")[0].split()[0], FAULTS).name
+            response.message = self._set({name: [*self._lines(name), line]})
             response.fault = line
         except ValueError as error:
             response.message = str(error)
@@ -33,13 +36,15 @@ class FaultServices:
         return response
 
     def _clear(self, request: Any, response: Any) -> Any:
-        lines, wanted = self._lines(), request.fault.strip()
+        given = {name: self._lines(name) for name in self._names}
+        lines, wanted = [line for of_one in given.values() for line in of_one], request.fault.strip()
         ended = [line for line in lines if wanted in ("", line, line.split()[0])]
         if not ended and wanted:
             expected = " or ".join(map(repr, lines)) or "none, nothing fails here"
             response.message = f"fault: {shown(wanted)} given, expected {expected}"
         else:
-            response.message = self._set([line for line in lines if line not in ended])
+            kept = {name: [line for line in of_one if line not in ended] for name, of_one in given.items()}
+            response.message = self._set({name: left for name, left in kept.items() if left != given[name]})
         response.success = not response.message
         response.cleared = ended if response.success else []
         return response
@@ -60,16 +65,28 @@ class FaultServices:
         start_s = self._node.next_cycle_ns() / 1e9
         times = {"from": start_s} | ({"to": start_s + duration} if duration else {})
         line = line_of(request.target, request.kind, request.values, times)
-        component = self._node.component_type
-        values = shaped_values(component.table(), self._node.canonical)
-        parse_line(line, component.fault_kinds, component.fault_units(values))
+        parse_line(line, *self._may_fail(request.target))
         return line
 
-    def _lines(self) -> list[str]:
-        return list(self._node.canonical[FAULTS.name])
+    def _may_fail(self, target: str) -> Host:
+        """What may fail of the node: with its own units, or in a message, by its clock or as a process."""
+        component = self._node.component_type
+        values = shaped_values(component.table(), self._node.canonical)
+        if target.partition(".")[0] in link_kinds.SORTS or not component.fault_kinds:
+            return Host(link_kinds.KINDS, component.link_units(self._node.get_name(), values))
+        return Host(component.fault_kinds, component.fault_units(values))
 
-    def _set(self, lines: list[str]) -> str:
-        """Why the parameter cannot have these lines; empty when it has."""
-        value = RosParameter(FAULTS.name, RosParameter.Type.STRING_ARRAY, lines)
-        (result,) = self._node.set_parameters([value])
-        return result.reason if not result.successful else ""
+    @property
+    def _names(self) -> tuple[str, ...]:
+        return (*((FAULTS.name,) if self._node.component_type.fault_kinds else ()), LINK_FAULTS.name)
+
+    def _lines(self, name: str) -> list[str]:
+        return list(self._node.canonical[name])
+
+    def _set(self, lines: dict[str, list[str]]) -> str:
+        """Why the parameters cannot have these lines; empty when they have."""
+        for name, of_one in lines.items():
+            (result,) = self._node.set_parameters([RosParameter(name, RosParameter.Type.STRING_ARRAY, of_one)])
+            if not result.successful:
+                return str(result.reason)
+        return ""

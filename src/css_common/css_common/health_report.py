@@ -8,37 +8,10 @@ import numpy as np
 from css_common.codec import Sample
 from css_common.component import Component, Output
 from css_common.health import Verdict, verdicts_of
-from css_msgs.msg import Faults, Health
+from css_common.health_words import EVIDENCE_WORDS, KIND_WORDS, unit_name
+from css_msgs.msg import Health
 
 _KEY = "health"
-
-_AXES = "xyz"
-_AXES_OF = (Faults.SORT_GYRO, Faults.SORT_MAGNETOMETER)
-
-
-def _names(message: type, prefix: str) -> dict[int, str]:
-    constants = (name for name in dir(type(message)) if name.startswith(prefix))
-    return {getattr(message, name): name.removeprefix(prefix).lower().replace("_", " ") for name in constants}
-
-
-_SORTS = _names(Faults, "SORT_")
-_KINDS = {**_names(Faults, "KIND_"), Health.KIND_UNKNOWN: "wrong in a way that has no name"}
-_EVIDENCE = {
-    Health.EVIDENCE_RANGE: "it reads what none can",
-    Health.EVIDENCE_STUCK: "it reads the same while it should have changed",
-    Health.EVIDENCE_DEAD: "it gives nothing where much was predicted",
-    Health.EVIDENCE_NOISE: "from sample to sample it changes more than it can",
-    Health.EVIDENCE_OPPOSITE: "it is lit together with the opposite one",
-    Health.EVIDENCE_VOTE: "those that look the same way say otherwise",
-    Health.EVIDENCE_RESIDUAL: "all others together say otherwise",
-    Health.EVIDENCE_DRIFT: "small contradictions of one sign add up",
-    Health.EVIDENCE_DARK: "it reads light in the shadow of the Earth",
-    Health.EVIDENCE_COMMON: "it failed together with all others of its board",
-    Health.EVIDENCE_SUN: "the motion of the Sun says otherwise",
-    Health.EVIDENCE_FIELD: "the magnetic field says otherwise",
-    Health.EVIDENCE_MOMENTUM: "the speeds of the wheels say otherwise",
-    Health.EVIDENCE_RESPONSE: "it does not what it is commanded",
-}
 
 
 def health_output(name: str) -> Output:
@@ -80,6 +53,7 @@ class HealthReport:
             else:
                 since_ns = known[1]
             self._told[key] = (verdict, since_ns)
+        component.left_out = tuple(unit_name(*key) for key in self._told)
         begins = first and _is_first(component, stamp_ns)
         if not verdicts and begins:
             return {}
@@ -104,26 +78,22 @@ class HealthReport:
     ) -> Iterable[str]:
         now_s = (stamp_ns - component.epoch_ns) * 1e-9
         for key, (verdict, since_ns) in self._told.items():
-            name, kind = _unit(*key), _KINDS.get(verdict.kind, str(verdict.kind))
+            name, kind = unit_name(*key), KIND_WORDS.get(verdict.kind, str(verdict.kind))
             known = before.get(key)
             if known is None:
                 since_s = (since_ns - component.epoch_ns) * 1e-9
-                evidence = _EVIDENCE.get(verdict.evidence, str(verdict.evidence))
+                evidence = EVIDENCE_WORDS.get(verdict.evidence, str(verdict.evidence))
                 yield (
                     f"{name} held for failed at {now_s:g} s, {kind}: {evidence} ({verdict.statistic:.4g}, more than "
                     f"{verdict.threshold:.4g}, from {since_s:g} s on); {self._done(verdict)}"
                 )
             elif known[0].kind != verdict.kind:
-                yield f"{name} at {now_s:g} s: taken for {kind}, no longer for {_KINDS.get(known[0].kind)}"
+                yield f"{name} at {now_s:g} s: taken for {kind}, no longer for {KIND_WORDS.get(known[0].kind)}"
         for key in before:
             if key not in self._told:
-                yield f"{_unit(*key)} used again at {now_s:g} s"
+                yield f"{unit_name(*key)} used again at {now_s:g} s"
 
 
 def _is_first(component: Component, stamp_ns: int) -> bool:
     """Whether a stamp is that of the first cycle of a flight: before it nobody has said anything."""
     return component.step_of(stamp_ns) == 0
-
-
-def _unit(sort: int, unit: int) -> str:
-    return f"{_SORTS.get(sort, sort)}.{_AXES[unit] if sort in _AXES_OF and unit < len(_AXES) else unit}"

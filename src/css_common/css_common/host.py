@@ -25,20 +25,23 @@ from rclpy.qos import QoSPolicyKind
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.timer import Timer
 
-from css_common import ros_parameters
+from css_common import process_faults, ros_parameters
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Outgoing, Output, Plant
 from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import Edge
 from css_common.fault_services import FaultServices
+from css_common.link_kinds import LINK_FAULTS
 from css_common.matching import Matcher
 from css_common.mission import Event, Mission
+from css_common.process_faults import ProcessFaults
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_common.rcl_errors import endpoint
 from css_common.ros_internals import RCLError
 from css_common.schema import ParameterError, Values
 from css_common.sole_subscription import SoleSubscription
 from css_common.stepping import Stepper, conflict
+from css_common.supervised import announced_before
 from css_common.writers import writer_choice
 
 REJECTED = ".rejected."
@@ -128,7 +131,8 @@ class ComponentNode(LifecycleNode):
         self._deadline_timer: Timer | None = None
         self._overdue_stamp: int | None = None
         self._guard_lifecycle_service()
-        self.fault_services = FaultServices(self) if component_type.fault_kinds else None
+        self.fault_services = FaultServices(self)
+        self._process_faults = ProcessFaults(self._say_farewell)
         ros_parameters.guard(self, self._table, self.canonical, self._tune, self._conflict)
 
     def next_cycle_ns(self) -> int:
@@ -219,7 +223,7 @@ class ComponentNode(LifecycleNode):
         awaited = [i.key for i in inputs if i.required or i.topic in published]
         self.matcher = Matcher(self.component, inputs, awaited)
         self.stepper.tuned = self.matcher.retune
-        for output in self.component_type.outputs(name, values):
+        for output in self.component_type.all_outputs(name, values):
             with endpoint(output.topic):
                 self._output_ports[output.key] = self._create_output(output)
         for source in inputs:
@@ -362,6 +366,7 @@ class ComponentNode(LifecycleNode):
 
     def _run(self, stamp_ns: int, received: dict[str, Sample | None]) -> None:
         self._last_stamp = stamp_ns
+        self._let_fail(stamp_ns)
         if self._began is None:
             self._mark_begin()
         # An exception that leaves a callback ends the process, so whatever a component does wrong ends here.
@@ -375,13 +380,23 @@ class ComponentNode(LifecycleNode):
         else:
             self.counters["cycles"] += 1
 
+    def _let_fail(self, stamp_ns: int) -> None:
+        """Has the faults of its process that are due."""
+        link = self.stepper.link
+        if link.of_process:
+            self._process_faults.act(link.of_process, self.component.step_of(stamp_ns))
+
+    def _say_farewell(self) -> None:
+        self._publish({})  # its faults
+        self.finish(1.0)
+
     def _awaited_in_lockstep(self) -> bool:
         """Whether simulated time may stand still for this node: what it leaves out it then has to make up for."""
         return self.mission.plant is not None and self.mission.values.lockstep.realtime_factor == 0.0
 
     def _publish(self, outgoing: Outgoing) -> None:
-        for port, sample in self.stepper.checked(outgoing):
-            self._output_ports[port.key][0].publish(port.codec.encode(sample))
+        for port, _, data in self.stepper.sent(self._last_stamp, outgoing):
+            self._output_ports[port.key][0].publish(data)
 
     def _withhold(self, topic: str, field: str) -> None:
         self.counters["withheld_not_finite"] += 1
@@ -400,6 +415,7 @@ class ComponentNode(LifecycleNode):
     def _stepper(self, name: str) -> Stepper:
         mission = self.mission
         stepper = Stepper(self.component_type, name, self.canonical, mission.events, mission.epoch_ns)
+        stepper.link.forget(announced_before())
         stepper.is_active = False
         stepper.perform = self._perform
         stepper.failed = self._report_failure
@@ -430,9 +446,12 @@ class ComponentNode(LifecycleNode):
     # Parameters
 
     def _conflict(self, canonical: dict) -> str | None:
+        reason = process_faults.refusal(canonical[LINK_FAULTS.name])
+        if reason is not None:
+            return f"{LINK_FAULTS.name}: {reason}"
         if self.stepper is not None:
             return self.stepper.refusal(canonical)
-        return conflict(self.component_type, canonical)
+        return conflict(self.component_type, canonical, self.get_name())
 
     def _tune(self, canonical: dict) -> None:
         if self.stepper is None:
@@ -463,17 +482,27 @@ class ComponentNode(LifecycleNode):
         if self.matcher is not None:
             counters["unmatched"] = self.matcher.unmatched
             counters["time_set_back"] = self.matcher.set_back
+            if self.stepper.skipped:
+                counters["skipped"] = self.stepper.skipped
+        level, message = self._own_state()
+        left_out = () if self.component is None else self.component.left_out
+        if left_out and level == DiagnosticStatus.OK:
+            level, message = DiagnosticStatus.WARN, f"held for failed: {', '.join(left_out)}"
+        return Health(level, message, counters, self._last_stamp, left_out)
+
+    def _own_state(self) -> tuple[bytes, str]:
+        """Level and one line, of what goes on in the node itself."""
         if any(self.counters[kind] > self._forgiven[kind] for kind in ("cycle_failed", "withheld_not_finite")):
-            return Health(DiagnosticStatus.ERROR, "cycles failed", counters, self._last_stamp)
+            return DiagnosticStatus.ERROR, "cycles failed"
         if any(edge.rejected for edge in self.edges.values()):
-            return Health(DiagnosticStatus.WARN, "messages rejected", counters, self._last_stamp)
+            return DiagnosticStatus.WARN, "messages rejected"
         if any(subscription.refused for subscription in self.subscriptions_made):
-            return Health(DiagnosticStatus.WARN, "other nodes write its topics too", counters, self._last_stamp)
+            return DiagnosticStatus.WARN, "other nodes write its topics too"
         unmet = self._unmet()
         if unmet:
-            return Health(DiagnosticStatus.WARN, unmet, counters, self._last_stamp)
+            return DiagnosticStatus.WARN, unmet
         state = "active" if self._is_active else "inactive"
-        return Health(DiagnosticStatus.OK, state, counters, self._last_stamp)
+        return DiagnosticStatus.OK, state
 
     def _named(self, topic: str) -> str:
         """A topic, and how to do without it."""

@@ -9,6 +9,7 @@ import numpy as np
 from css_common.codec import Sample
 from css_common.component import Component, Cycles, Input
 from css_common.edge import HISTORY
+from css_common.link import GAP
 from css_common.message_columns import Columns
 
 _MOST_PENDING = 2 * HISTORY  # more than the lead of the fastest topic over a node that was restarted
@@ -81,6 +82,8 @@ class Matcher:
         """Takes a message; returns the cycles that are now complete, oldest first."""
         if key in self._unheeded:
             return []
+        if sample.frame_id == GAP:
+            return self._offer_gap(key, sample)
         if not self.exact:
             return self._offer_latest(key, sample)
         stamp = sample.stamp_ns
@@ -96,8 +99,12 @@ class Matcher:
                 _note(self._late, self.inputs[key].topic, stamp)
                 return []
             self._begin_anew()
+        return self._put(stamp, key, sample)
+
+    def _put(self, stamp: int, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         slots = self._pending.setdefault(stamp, {})
-        slots[key] = sample
+        if key not in slots or slots[key].frame_id != GAP:  # once it was said that nothing comes, it is too late
+            slots[key] = sample
         if not slots.keys() >= self._due(stamp):
             if len(self._pending) > _MOST_PENDING:
                 # the one that waits longest; by stamp, leftovers of a time ahead would push out every new one
@@ -227,6 +234,18 @@ class Matcher:
             self._give_up(older)
         self._done = stamp
         return stamp, {key: slots.get(key) for key in self.inputs}
+
+    def _offer_gap(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
+        """Takes the word for it that no message of a stamp comes, if none has."""
+        stamp = sample.stamp_ns
+        if stamp <= self._done or key in self._pending.get(stamp, ()):
+            return []
+        if self.exact:
+            return self._put(stamp, key, sample)
+        if key != self._pacing:
+            return []
+        self._done = stamp
+        return [(stamp, {name: sample if name == key else None for name in self.inputs})]
 
     def _offer_latest(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         self._latest[key] = sample

@@ -19,6 +19,8 @@ from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
 from css_common.epochs import mission_epoch
 from css_common.fault_lines import FAULTS, SECTION, Host, entries_of, entry_parameter
+from css_common.link_kinds import KINDS as LINK_KINDS
+from css_common.link_kinds import LINK_FAULTS, of_sorts, parameter_of
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
@@ -85,7 +87,14 @@ class Node:
     @property
     def outputs(self) -> tuple[Output, ...]:
         """Topics it publishes."""
-        return self.component.outputs(self.name, self.values)
+        return self.component.all_outputs(self.name, self.values)
+
+    @property
+    def host(self) -> Host:
+        """What may fail of it."""
+        kind, values = self.component, self.values
+        own = kind.fault_units(values) if kind.fault_kinds else {}
+        return Host((*kind.fault_kinds, *LINK_KINDS), {**own, **kind.link_units(self.name, values)})
 
 
 class Mission:
@@ -223,6 +232,25 @@ class Mission:
         exact = self.values.io.input_matching == "exact"
         return tuple(topic for topic in ends if not (exact and topic in implied))
 
+    def refuse_faults(self, why: str, *sorts: str) -> None:
+        """Refuses faults that a way of flying has no place for.
+
+        Args:
+            why: what they need, and what would be right.
+            sorts: of these.
+
+        Raises:
+            MissionError: the mission has one.
+        """
+        for node in self.nodes:
+            for line in of_sorts(node.canonical[LINK_FAULTS.name], *sorts):
+                names = [entry.name for entry in self.faults if entry.line == line]
+                where = f"{SHARED}: {SECTION}{names[0]}" if names else f"{node.name}: {LINK_FAULTS.name}"
+                raise MissionError(f"{self.origin}: {where}: {shown(line)} {why}")
+        for event in self.events:
+            for line in of_sorts(event.value, *sorts) if event.parameter == LINK_FAULTS.name else ():
+                raise MissionError(f"{self.origin}: {SHARED}: events.{event.name}: {shown(line)} {why}")
+
     def with_overrides(self, overrides: Iterable[str]) -> "Mission":
         """The mission with `key=value` texts applied; a key may begin with a node's name (`ekf.use_gyro=false`).
 
@@ -339,24 +367,26 @@ class Mission:
             canonical = checked_values(table, {key: value for key, value in given.items() if key in names})
             values = shaped_values(table, canonical)
             if not (self._alone and any(missing_values(component, values))):
-                _refuse(all_conflicts(component, values))
+                _refuse(all_conflicts(component, values, name))
         return Node(name, package, executable, component, canonical, values)
 
     def _hosts(self) -> dict[str, Host]:
         """What may fail, by node."""
-        faulty = [node for node in self.nodes if node.component.fault_kinds]
-        return {n.name: Host(n.component.fault_kinds, n.component.fault_units(n.values)) for n in faulty}
+        return {node.name: node.host for node in self.nodes}
 
     def _with_faults(self, node: Node) -> Node:
         """A node with the faults of the mission's entries after those of its own parameter."""
-        lines = [entry.line for entry in self.faults if entry.node == node.name]
-        if not lines:
+        given = [entry for entry in self.faults if entry.node == node.name]
+        if not given:
             return node
-        canonical = {**node.canonical, FAULTS.name: [*node.canonical[FAULTS.name], *lines]}
+        canonical = dict(node.canonical)
+        for entry in given:
+            key = parameter_of(entry.line.partition(".")[0], FAULTS).name
+            canonical[key] = [*canonical[key], entry.line]
         values = shaped_values(node.component.table(), canonical)
         if not any(missing_values(node.component, values)):
             with _naming(self.origin, node.name):
-                _refuse(all_conflicts(node.component, values))
+                _refuse(all_conflicts(node.component, values, node.name))
         return replace(node, canonical=canonical, values=values)
 
     def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:

@@ -20,6 +20,7 @@ from css_common.codec import DecodeError, Sample, stamp_of
 from css_common.component import Outgoing, Plant
 from css_common.edge import HISTORY, Edge
 from css_common.host import ComponentNode
+from css_common.link import GAP
 from css_common.qos import PROGRESS_TOPIC, RECORDER
 from css_common.rcl_errors import endpoint
 from css_common.sole_subscription import writers_of
@@ -220,6 +221,7 @@ class PlantNode(ComponentNode):
         self._warned.clear()
         self._waiting_since = time.monotonic()
         self.counters["cycles"] += 1
+        self._let_fail(stamp_ns)
         try:
             self.stepper.apply_due(stamp_ns)
             if self._clock_publisher is not None:
@@ -251,7 +253,8 @@ class PlantNode(ComponentNode):
             edge.guard.last = None
         sample = edge.accept(data)
         if sample is not None:
-            self._take(key, edge.source.topic, sample.stamp_ns, sample)
+            given = None if sample.frame_id == GAP else sample
+            self._take(key, edge.source.topic, sample.stamp_ns, given)
 
     def _note_recorded(self, data: bytes) -> None:
         with contextlib.suppress(DecodeError):
@@ -280,7 +283,7 @@ class PlantNode(ComponentNode):
         if stamp_ns != self._stamp:
             self.counters["answers_for_another_stamp"] += 1
             return
-        self._answers[key] = sample
+        self._answers.setdefault(key, sample)  # once it was said that nothing comes, it is too late
         self._advance_if_answered()
 
     def _advance_if_answered(self) -> None:

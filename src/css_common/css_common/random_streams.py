@@ -45,6 +45,8 @@ class Stream(IntEnum):
     CLOUDS = 24
     EPOCH = 25
     FAULT = 26
+    LINK_FAULT = 27
+    HEAD_FAULT = 28
 
 
 class RandomKey(NamedTuple):

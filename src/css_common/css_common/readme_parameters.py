@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from css_common.fault_lines import FaultKind
+from css_common.link_kinds import KINDS as LINK_KINDS
 from css_common.node_files import find_component
 from css_common.schema import Parameter
 
@@ -39,6 +40,7 @@ def rewritten(text: str, package: str) -> str:
         return found["before"] + "".join(rows)
 
     kinds = dict.fromkeys(kind for node in documented(text) for kind in find_component(package, node).fault_kinds)
+    kinds = kinds or dict.fromkeys(LINK_KINDS)  # where no node is, those that any node has
     faults = "".join(f"{fault_row(kind)}\n" for kind in kinds)
     return _FAULTS.sub(lambda found: found["before"] + faults, _TABLE.sub(table, text))
 

@@ -15,6 +15,7 @@ import numpy as np
 from css_common.codec import MAX_FRAME
 from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
+from css_common.link_kinds import LINK_FAULTS
 from css_common.schema import Table, Values, choice, flag, integer, real, reals, shown, text, texts
 from css_common.section import Section, unit_rows
 
@@ -277,7 +278,7 @@ IO: Table = (
         ("exact", "latest"),
         "exact: inputs of one stamp belong together; latest: the newest of each, for devices with own clocks",
     ),
-    real("io.deadline", 0.5, "s", "age at which an input counts as silent", low=0.001, tunable=True),
+    real("io.deadline", 0.5, "s", "age at which an input counts as silent", low=0.001, high=1e9, tunable=True),
     text("io.body_frame", "bus", "frame_id of body-frame messages"),
     text("io.inertial_frame", "eci", "frame_id of inertial messages"),
     texts("io.accepted_frames", (), "further frame_ids taken for the expected one, as hardware drivers name them"),
@@ -288,7 +289,8 @@ IO: Table = (
         "whose messages are taken: first: one writer a topic until it is gone, the mission's own before others; "
         "graph: only the node that the mission names for a topic",
     ),
-    real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001),
+    LINK_FAULTS,
+    real("io.largest_gap", 60.0, "s", "a stamp further ahead than this must be confirmed", low=0.001, high=1e9),
     flag("autostart", True, "configure and activate without being asked"),
 )
 

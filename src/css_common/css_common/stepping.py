@@ -15,6 +15,7 @@ import numpy as np
 
 from css_common.codec import Codec, Sample, codec_of
 from css_common.component import Component, Cycles, Outgoing, Received, all_conflicts
+from css_common.link import GAP, Link, gap
 from css_common.message_columns import unstack
 from css_common.mission import Event
 from css_common.schema import ParameterError, shaped_values
@@ -36,10 +37,10 @@ def first_step(event: Event, period_ns: int) -> int:
     return step
 
 
-def conflict(component_type: type[Component], canonical: Mapping[str, Any]) -> str | None:
+def conflict(component_type: type[Component], canonical: Mapping[str, Any], name: str) -> str | None:
     """The first thing that is wrong between values that are each sane, or None."""
     values = shaped_values(component_type.table(), canonical)
-    return next(all_conflicts(component_type, values), None)
+    return next(all_conflicts(component_type, values, name), None)
 
 
 class Port(NamedTuple):
@@ -50,6 +51,10 @@ class Port(NamedTuple):
     codec: Codec
     real_fields: list
     events: bool  # as of `Output`
+
+
+def _is_gap(given: Any) -> bool:
+    return type(given) is Sample and given.frame_id == GAP
 
 
 def _raise(error: Exception) -> None:
@@ -63,10 +68,13 @@ class Stepper:
         component: what is stepped.
         canonical: its values in force.
         ports: its outputs by key.
+        dividers: every how many steps it gives a message of each output that is none of events.
         is_active: it cycles; else it is idle.
         perform: called with each event that is due; `apply` unless a host has its own way to do it.
         tuned: called after each change of values.
         failed: called with what the component raises when it takes new values; raises it unless replaced.
+        link: the way of its messages.
+        skipped: cycles that there were not, because a message did not come.
         withheld: called with topic and field of a message that is not finite and therefore does not go out.
     """
 
@@ -91,14 +99,20 @@ class Stepper:
         self.component = component_type(name, shaped_values(component_type.table(), self.canonical))
         self.ports = {
             output.key: Port(output.key, output.topic, codec, codec.real_fields(), output.events)
-            for output in component_type.outputs(name, self.component.values)
+            for output in component_type.all_outputs(name, self.component.values)
             for codec in (codec_of(output.message_type),)
         }
+        self._required = {i.key: i.divider for i in component_type.inputs(name, self.component.values) if i.required}
+        self.dividers = {
+            o.key: o.divider for o in component_type.all_outputs(name, self.component.values) if not o.events
+        }
+        self.link = Link(self.component, component_type.link_units(name, self.component.values))
         self.is_active = True
         self.perform: Callable[[Event], None] = self.apply
         self.tuned: Callable[[], None] = lambda: None
         self.failed: Callable[[Exception], None] = _raise
         self.withheld: Callable[[str, str], None] = lambda topic, field: None
+        self.skipped = 0
         self._begins_anew = False
         self._epoch_ns = epoch_ns
         self._waiting = deque(event for event in events if event.node == name)
@@ -108,11 +122,32 @@ class Stepper:
         if self._waiting:
             self.apply_due(stamp_ns)
         component = self.component
+        for given in received.values():
+            if type(given) is Sample and given.frame_id == GAP:
+                received = {key: None if _is_gap(one) else one for key, one in received.items()}
+                if self._lacks(component.step_of(stamp_ns), received):
+                    return self._nothing(stamp_ns)
+                break
         return (component.cycle if self.is_active else component.idle)(stamp_ns, received)
 
+    def _lacks(self, step: int, received: Received) -> bool:
+        """Whether there is no cycle because a message that it needs did not come."""
+        return any(step % divider == 0 and received.get(key) is None for key, divider in self._required.items())
+
+    def _nothing(self, stamp_ns: int) -> Outgoing:
+        """Gaps in the place of the messages of a cycle that there is not."""
+        self.skipped += 1
+        step = self.component.step_of(stamp_ns)
+        due = (key for key, divider in self.dividers.items() if step % divider == 0)
+        return {key: gap(self.ports[key], stamp_ns) for key in due}
+
     def is_quiet(self, stamp_ns: int) -> bool:
-        """It cycles, and no event is due up to a stamp."""
-        return self.is_active and not (self._waiting and is_due(self._waiting[0], stamp_ns - self._epoch_ns))
+        """It cycles, its messages pass as they are, and no event is due up to a stamp."""
+        return (
+            self.is_active
+            and self.link.is_quiet
+            and not (self._waiting and is_due(self._waiting[0], stamp_ns - self._epoch_ns))
+        )
 
     @property
     def offers_steps(self) -> bool:
@@ -149,6 +184,18 @@ class Stepper:
                 else:
                     self.withheld(port.topic, bad)
 
+    def sent(self, stamp_ns: int, outgoing: Outgoing) -> Iterator[tuple[Port, Sample, bytes]]:
+        """What goes out at a stamp, in its order: the messages that may, and what becomes of them on their way."""
+        link = self.link
+        if not (link.faults or link.tells or link.held):  # as nearly always
+            for port, sample in self.checked(outgoing):
+                yield port, sample, port.codec.encode(sample)
+            return
+        told = link.told(stamp_ns)
+        messages = self.checked({**outgoing, **told} if told else outgoing)
+        for port, sample in self.link.carry(stamp_ns, messages):
+            yield port, sample, port.codec.encode(sample)
+
     def apply_due(self, stamp_ns: int) -> None:
         """Performs the events that are due at a stamp, each once and in their order."""
         elapsed_ns = stamp_ns - self._epoch_ns
@@ -183,14 +230,16 @@ class Stepper:
 
     def snapshot(self) -> Any:
         """All that the coming steps hang on, for `restore`."""
-        return copy.deepcopy(self._memory())
+        return copy.deepcopy(self._memory()), self.link.memory()
 
     def restore(self, snapshot: Any) -> None:
         """Goes back to a snapshot, which may be used again; it may be that of another stepper of the same kind."""
-        state, self.canonical, self.is_active, self._begins_anew, self._waiting = copy.deepcopy(snapshot)
+        memory, link = snapshot
+        state, self.canonical, self.is_active, self._begins_anew, self._waiting = copy.deepcopy(memory)
         # the component stays the one that others know
         vars(self.component).clear()
         vars(self.component).update(state)
+        self.link.recall(link)
         self.tuned()
 
     def _memory(self) -> tuple:
@@ -209,7 +258,7 @@ class Stepper:
 
     def refusal(self, canonical: Mapping[str, Any]) -> str | None:
         """Why it cannot take values that are each sane: the first thing that is wrong between them, or None."""
-        reason = conflict(type(self.component), canonical)
+        reason = conflict(type(self.component), canonical, self.component.name)
         return reason or self.component.untimely(shaped_values(self.component.table(), canonical))
 
     def tune(self, changes: Mapping[str, Any]) -> None:
@@ -217,6 +266,7 @@ class Stepper:
         self.canonical.update(changes)
         try:
             self.component.tune(shaped_values(self.component.table(), self.canonical))
+            self.link.take()
         except Exception as error:
             self.failed(error)
         self.tuned()

@@ -9,7 +9,8 @@ from message_numbers import shared_numbers
 from css_common import health
 from css_common.component import Component
 from css_common.health import SORT_GYRO, SORT_WHEEL, Verdict, held_mask, hold, new_verdicts, release, verdicts_of
-from css_common.health_report import _EVIDENCE, HealthReport, health_output
+from css_common.health_report import HealthReport, health_output
+from css_common.health_words import EVIDENCE_WORDS
 from css_common.mission import load_mission
 from css_msgs.msg import Faults, Health
 
@@ -45,7 +46,7 @@ def test_numbers_are_those_of_the_messages(message, count):
 
 
 def test_each_evidence_has_its_words():
-    assert set(_EVIDENCE) == {getattr(Health, name) for name in dir(type(Health)) if name.startswith("EVIDENCE_")}
+    assert set(EVIDENCE_WORDS) == {getattr(Health, name) for name in dir(type(Health)) if name.startswith("EVIDENCE_")}
 
 
 def test_a_verdict_is_told_once_and_again_when_it_is_withdrawn(judge):
@@ -62,6 +63,7 @@ def test_a_verdict_is_told_once_and_again_when_it_is_withdrawn(judge):
         [Health.EVIDENCE_RESPONSE],
     ]
     assert message.rows.tolist() == [12.5, 5.0, 3.0]
+    assert judge.left_out == ("wheel.2",)
     assert judge.lines == [
         "wheel.2 held for failed at 5 s, dead: it does not what it is commanded (12.5, more than 5, from 3 s on); "
         "wheel 2 is commanded nothing"
@@ -73,6 +75,7 @@ def test_a_verdict_is_told_once_and_again_when_it_is_withdrawn(judge):
     release(rows[2])
     message = report.told(judge, stamp(judge, 60), rows, 60)["health"]
     assert message.unit.tolist() == [] and message.rows.tolist() == []
+    assert judge.left_out == ()
     assert judge.lines[1:] == ["wheel.2 at 5.2 s: taken for friction, no longer for dead", "wheel.2 used again at 6 s"]
 
 

@@ -110,7 +110,7 @@ SHARED_ERRORS = {
     "io: {deadlin: 0.5}": "bench.yaml: /**: io.deadlin: unknown; did you mean io.deadline?",
     "ios: {deadline: 0.5}": "bench.yaml: /**: ios.deadline: unknown; did you mean io.deadline?",
     "io: {deadline: 1}": "bench.yaml: /**: io.deadline: 1 given, expected a number written with a point [s]",
-    "io: {deadline: -0.5}": "bench.yaml: /**: io.deadline: -0.5 given, expected at least 0.001 [s]",
+    "io: {deadline: -0.5}": "bench.yaml: /**: io.deadline: -0.5 given, expected at least 0.001 and at most 1e+09 [s]",
     "io: {deadline: }": "bench.yaml: /**: io.deadline: None given",
     "io: {deadline: .nan}": "bench.yaml: /**: io.deadline: nan given, expected a finite number",
     "use_sim_time: 3": "bench.yaml: /**: use_sim_time: 3 given, expected true or false",

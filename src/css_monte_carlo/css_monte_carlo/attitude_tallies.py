@@ -18,6 +18,7 @@ from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeSol
 from css_estimation.sun.error_covariance import attitude_block
 from css_estimation.symmetric import inverse_form, trace
 from css_monte_carlo.case_tallies import BIN_DEG, BINS, SUNLIT, sample_count
+from css_monte_carlo.health_tallies import ActuatorsLeft
 from css_monte_carlo.step_truth import Truth
 
 _DEG = 180.0 / math.pi
@@ -79,6 +80,7 @@ def tally_step(
     heading,
     attitude: AttitudeSolution,
     memory: Any,
+    left: ActuatorsLeft,
 ) -> None:
     """Counts one step of case `c`.
 
@@ -86,6 +88,7 @@ def tally_step(
         marks: of the step, see `case_tallies.step_marks`.
         heading: of a Sun estimator, not read.
         attitude, memory: what the filter says; of its memory the `covariance` (n, n) is read.
+        left: actuators that the control holds for failed, not read.
     """
     t = tallies.totals[c]
     if attitude.validity == VALIDITY_NONE:

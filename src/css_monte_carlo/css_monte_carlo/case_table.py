@@ -6,14 +6,15 @@ import pyarrow as pa
 
 from css_analysis.flight_metrics import Windows
 from css_analysis.quantities import CaseSums
-from css_monte_carlo.case_tallies import BIN_DEG
+from css_monte_carlo.case_tallies import BIN_DEG, Tallies
 from css_monte_carlo.measures import ATTITUDE, HEADING, CaseTallies, Measure
 
 
 def case_table(numbers: np.ndarray, tallies: CaseTallies, period_s: float, windows: Windows) -> pa.Table:
     """One row a case: quantities, null for what never came, and the samples of each sampled quantity as a list."""
     measure = measure_of(tallies)
-    sums = CaseSums(tallies.totals, tallies.histogram, BIN_DEG, period_s)
+    health = tallies.health if isinstance(tallies, Tallies) else None
+    sums = CaseSums(tallies.totals, tallies.histogram, BIN_DEG, period_s, health)
     columns = {"case": pa.array(numbers, pa.uint32())}
     for quantity in measure.quantities(windows):
         values = quantity.tally if measure is HEADING else quantity.attitude_tally

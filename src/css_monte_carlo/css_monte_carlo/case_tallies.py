@@ -15,6 +15,7 @@ from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITI
 from css_common.kernel import kernel
 from css_common.vectors import angle_between, norm, subtract
 from css_estimation.sun.sun_heading import VALIDITY_NONE, SunHeading
+from css_monte_carlo.health_tallies import ActuatorsLeft, HealthTallies, Held, new_health, tally_health
 from css_monte_carlo.step_truth import Truth
 
 REPORT_SPAN = 60.0
@@ -97,6 +98,7 @@ class Tallies(NamedTuple):
     histogram: np.ndarray  # (C, bins) heading errors after acquisition
     pending: np.ndarray  # (C, 2, P) heading and pointing errors of a run that may become the acquisition
     samples: np.ndarray  # (C, quantities, S) float32
+    health: HealthTallies
     acquire_steps: int  # a run of more steps than this is an acquisition
     sample_every: int  # steps from sample to sample
     detumbled_rate: float  # [deg/s]
@@ -116,6 +118,7 @@ def new_tallies(
         np.zeros((cases, BINS), np.int64),
         np.zeros((cases, 2, acquire_steps + 1)),
         np.full((cases, len(SAMPLED), sample_count(steps, sample_every)), np.nan, np.float32),
+        new_health(cases),
         acquire_steps,
         sample_every,
         detumbled_rate_deg_s,
@@ -158,7 +161,15 @@ def note_estimate(heading: SunHeading, attitude, out) -> None:
 
 @kernel
 def tally_step(
-    tallies: Tallies, c: int, step: int, marks: int, truth: Truth, heading: SunHeading, attitude, memory
+    tallies: Tallies,
+    c: int,
+    step: int,
+    marks: int,
+    truth: Truth,
+    heading: SunHeading,
+    attitude,
+    memory,
+    left: ActuatorsLeft,
 ) -> None:
     """Count one step of case `c`.
 
@@ -166,6 +177,7 @@ def tally_step(
         marks: of the step, see `step_marks`.
         heading: what the Sun estimator says.
         attitude, memory: of an attitude filter, not read.
+        left: actuators that the control holds for failed.
     """
     sun_b, omega_bn_b = truth.sun_b, truth.omega_bn_b
     t = tallies.totals[c]
@@ -199,6 +211,9 @@ def tally_step(
     if heading.nis_dof > 0:
         t.innovations += heading.nis_dof
         t.nis_sum += heading.nis
+    tally_health(
+        tallies.health, c, step, truth.failing, Held(heading.isolated, left.wheels, left.rods, heading.sensors_left)
+    )
     t.momentum = norm(truth.wheel_momentum_b)
     t.momentum_max = max(t.momentum_max, t.momentum)
     t.steps += 1

@@ -14,7 +14,10 @@ import pyarrow as pa
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
 from css_monte_carlo.case_table import case_table
+from css_monte_carlo.case_tallies import Tallies
+from css_monte_carlo.drawn_faults import COLUMN, fault_column, has_faults
 from css_monte_carlo.errors import StudyError
+from css_monte_carlo.health_tallies import HealthTallies
 from css_monte_carlo.loop import Cases, Vehicle, fly_block
 from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
@@ -56,7 +59,10 @@ def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
     else:
         tallies, _, cpu_s = fly_cases(flight, numbers, task.sample_every, task.guess_deg)
     period_s = flight.mission.period_ns * 1e-9
-    return case_table(numbers, tallies, period_s, windows_of(flight.mission)), cpu_s
+    table = case_table(numbers, tallies, period_s, windows_of(flight.mission))
+    if has_faults(flight.mission):
+        table = table.append_column(COLUMN, fault_column(flight.mission, numbers))
+    return table, cpu_s
 
 
 @lru_cache(maxsize=2)
@@ -141,8 +147,13 @@ def fly_in_threads(
 
 def _joined(parts: Sequence[Any]) -> Any:
     """Tallies of all cases of some, in their order."""
-    by_case = ("totals", "histogram", "samples")
-    return parts[0]._replace(**{name: np.concatenate([getattr(part, name) for part in parts]) for name in by_case})
+    first = parts[0]
+    joined: dict[str, Any] = {
+        name: np.concatenate([getattr(part, name) for part in parts]) for name in ("totals", "histogram", "samples")
+    }
+    if isinstance(first, Tallies):
+        joined["health"] = HealthTallies(*map(np.concatenate, zip(*(part.health for part in parts), strict=True)))
+    return first._replace(**joined)
 
 
 def _check_motion(flight: MissionFlight, numbers: np.ndarray, rates: np.ndarray, step: int) -> None:

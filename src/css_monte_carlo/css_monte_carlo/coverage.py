@@ -9,10 +9,12 @@ where the spacecraft wants to point. Directions are cell centres; everything is 
 """
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from css_common.case_faults import NEVER
 from css_common.component import Component
 from css_common.kernel import outer_kernel
 from css_common.mission import Mission, Node
@@ -27,7 +29,7 @@ from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_sim import sun_cells
 from css_sim.cell_errors import nominal_cells
 from css_sim.cell_screen import cell_sides
-from css_sim.fault_effects import NO_FAULTS
+from css_sim.fault_effects import CELL, DEAD, FAULT
 from css_sim.nodes.css_array import CssArray
 from css_sim.sun_cells import SunCells, sample
 
@@ -108,11 +110,17 @@ def _node(mission: Mission, component: type[Component], name: str) -> Node:
     return next(of_kind, None) or mission.node_of(component, name)
 
 
-def map_cells(layout: Layout, grid: Grid, warp: bool = False) -> CellMap:
-    """The map of a layout, for cells with an ideal cosine or with the flattened response of Eq. 16 (`warp`)."""
+def map_cells(layout: Layout, grid: Grid, warp: bool = False, dead: Sequence[int] = ()) -> CellMap:
+    """The map of a layout, for cells with an ideal cosine or with the flattened response of Eq. 16 (`warp`).
+
+    Args:
+        dead: cells that give nothing.
+    """
+    faults = np.zeros(len(dead), FAULT)
+    faults["sort"], faults["kind"], faults["unit"], faults["end_step"] = CELL, DEAD, list(dead), NEVER
     shape = (len(grid.polar), len(grid.azimuth))
     result = CellMap(np.zeros(shape, dtype=np.int64), np.zeros(shape))
-    _map(layout._replace(chain=layout.chain._replace(warp=warp)), NO_FAULTS, random_key(0, 0), grid, *result)
+    _map(layout._replace(chain=layout.chain._replace(warp=warp)), faults, random_key(0, 0), grid, *result)
     return result
 
 

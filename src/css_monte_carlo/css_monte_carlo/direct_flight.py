@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from css_analysis.fault_record import fault_records
-from css_analysis.flight_log import LOGGED_TYPES, FlightLog
+from css_analysis.flight_log import LOGGED_TYPES, TOLD_TYPES, FlightLog
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
+from css_common.link_kinds import MESSAGES_FAIL, SORTS
 from css_common.message_columns import Columns
 from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
@@ -21,7 +21,6 @@ from css_common.schema import unknown_name
 from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_monte_carlo.mission_parts import is_attitude
-from css_msgs.msg import Faults
 
 
 def configured(
@@ -80,7 +79,7 @@ def fly_checked(mission: Mission) -> FlightLog:
     """As `fly_directly`, for a mission that has passed the checks before a flight."""
     steps = max(mission.steps, 1)
     wires: dict[str, _Wire | _Tape] = {
-        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=kind is Faults)
+        topic: _Wire(kind, steps) if kind in _LOGGED else _Tape(kind, keep=kind in TOLD_TYPES)
         for topic, kind in mission.topics.items()
     }
     _fly(mission, wires)
@@ -88,9 +87,9 @@ def fly_checked(mission: Mission) -> FlightLog:
     for topic, wire in wires.items():
         if isinstance(wire, _Wire):
             log.add(f"/{topic}", mission.topics[topic], wire.columns())
-    for _, wire in sorted(wires.items()):
+    for topic, wire in sorted(wires.items()):
         if isinstance(wire, _Tape):
-            log.faults += fault_records(wire.samples, mission.epoch_ns)
+            log.tell(f"/{topic}", mission.topics[topic], wire.samples)
     return log
 
 
@@ -110,7 +109,17 @@ def fly_and_keep(mission: Mission, topics: Iterable[str]) -> dict[str, list[Samp
     return {topic: wires[topic].samples for topic in kept}
 
 
+def refuse_what_needs_the_graph(mission: Mission) -> None:
+    """Refuses faults of messages, clocks and processes, which there are none of here.
+
+    Raises:
+        MissionError: the mission has one.
+    """
+    mission.refuse_faults(MESSAGES_FAIL, *SORTS)
+
+
 def _fly(mission: Mission, wires: "Wires") -> None:
+    refuse_what_needs_the_graph(mission)
     *others, plant = [_Part(node, mission) for node in _in_order(mission)]
     stamp_ns = mission.epoch_ns
     plant.stepper.apply_due(stamp_ns)

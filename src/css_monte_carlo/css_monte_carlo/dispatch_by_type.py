@@ -8,6 +8,7 @@ flight does not have: nothing is compiled for it. Running sums name their module
 from numba.extending import overload
 
 from css_estimation.sun.heading_dispatch import home_of
+from css_monte_carlo.health_tallies import NO_ACTUATORS_LEFT, ActuatorsLeft
 from css_monte_carlo.surroundings import references_at
 
 
@@ -24,7 +25,7 @@ def estimate_attitude(p, state, memory, dt, voltages, aiding, around, k):
 
 
 def command(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out):
-    """State after one cycle of a control law; without control, torques and dipoles stay as they are.
+    """State after one cycle of a control law, and `ActuatorsLeft`; without control, commands stay as they are.
 
     Args:
         heading: `SunHeading`.
@@ -33,9 +34,9 @@ def command(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out
     return _control_step(home_of(p))(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out)
 
 
-def tally(tallies, c, step, marks, truth, heading, attitude, memory):
+def tally(tallies, c, step, marks, truth, heading, attitude, memory, left):
     """Counts one step of case `c`; arguments as of `tally_step` in the module of the sums."""
-    _tally_step(home_of(tallies))(tallies, c, step, marks, truth, heading, attitude, memory)
+    _tally_step(home_of(tallies))(tallies, c, step, marks, truth, heading, attitude, memory, left)
 
 
 def note_estimate(tallies, heading, attitude, out):
@@ -81,11 +82,11 @@ def _overload_command(p, state, memory, dt, heading, speeds, field, torque_out, 
 
 def _control_step(home):
     if home is None:
-        return lambda p, state, memory, dt, heading, speeds, field, torque_out, dipole_out: None
+        return lambda p, state, memory, dt, heading, speeds, field, torque_out, dipole_out: (None, NO_ACTUATORS_LEFT)
     step = home.step
 
     def call(p, state, memory, dt, heading, speeds, field, torque_out, dipole_out):
-        after, _ = step(
+        after, output = step(
             p,
             state,
             memory,
@@ -100,21 +101,21 @@ def _control_step(home):
             torque_out,
             dipole_out,
         )
-        return after
+        return after, ActuatorsLeft(output.wheels_isolated, output.rods_isolated)
 
     return call
 
 
 @overload(tally, jit_options={"forceinline": True})
-def _overload_tally(tallies, c, step, marks, truth, heading, attitude, memory):
+def _overload_tally(tallies, c, step, marks, truth, heading, attitude, memory, left):
     return _tally_step(home_of(tallies))
 
 
 def _tally_step(home):
     tally_step = home.tally_step
 
-    def call(tallies, c, step, marks, truth, heading, attitude, memory):
-        tally_step(tallies, c, step, marks, truth, heading, attitude, memory)
+    def call(tallies, c, step, marks, truth, heading, attitude, memory, left):
+        tally_step(tallies, c, step, marks, truth, heading, attitude, memory, left)
 
     return call
 

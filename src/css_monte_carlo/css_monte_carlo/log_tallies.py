@@ -18,6 +18,10 @@ from css_estimation.sun.sun_heading import Covariance, SunHeading
 from css_monte_carlo import attitude_tallies, case_tallies
 from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.case_tallies import Tallies, step_marks
+from css_monte_carlo.failing_of_log import cell_kinds_by_step, failing_by_step, fault_table
+from css_monte_carlo.failing_units import NOTHING_FAILS
+from css_monte_carlo.health_tallies import NO_ACTUATORS_LEFT, ActuatorsLeft
+from css_monte_carlo.named_faults import note_cell_kinds
 from css_monte_carlo.step_truth import Truth
 
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
@@ -57,11 +61,20 @@ def tally_headings(tallies: Tallies, c: int, log: FlightLog, name: str, wheels: 
     momentum_b = _wheel_momentum(log, wheels)
     dipoles = _rod_dipoles(log)
     marks = step_marks(log.having("truth").illumination, log.period, windows_of(log.mission))
-    count = typed_call(case_tallies.tally_step)
+    faults, left = fault_table(log), _actuators_left(log)
+    failing, kinds = failing_by_step(log, faults), cell_kinds_by_step(log, name)
+    read = _voltages_by_step(log)
+    count, note = typed_call(case_tallies.tally_step), typed_call(note_cell_kinds)
     for step, row in enumerate(rows):
         heading = _NO_HEADING if estimates is None or row < 0 else _heading(estimates, row)
-        truth = _truth(log, step, log.having("truth").sigma_bn[step], momentum_b[step], np.zeros(3), dipoles[step])
-        count(tallies, c, step, int(marks[step]), truth, heading, None, None)
+        truth = _truth(
+            log, step, log.having("truth").sigma_bn[step], momentum_b[step], np.zeros(3), dipoles[step]
+        )._replace(failing=failing[step])
+        count(tallies, c, step, int(marks[step]), truth, heading, None, None, left[step])
+        taken_for = next(kinds)
+        held = failing[step].cells & heading.isolated
+        if held and step in read:
+            note(tallies.health, c, held, taken_for, faults, step, read[step])
 
 
 def tally_attitudes(tallies: AttitudeTallies, c: int, log: FlightLog, name: str, gyro_bias_b: np.ndarray) -> None:
@@ -85,7 +98,7 @@ def tally_attitudes(tallies: AttitudeTallies, c: int, log: FlightLog, name: str,
             solution = _solution(attitudes, row)
             memory.covariance[:] = attitudes.covariance[row].reshape(6, 6)
         truth = _truth(log, step, sigma_bn[step], np.zeros(3), gyro_bias_b[step], 0.0)
-        count(tallies, c, step, int(marks[step]), truth, None, solution, memory)
+        count(tallies, c, step, int(marks[step]), truth, None, solution, memory, NO_ACTUATORS_LEFT)
 
 
 def _rows_by_step(log: FlightLog, pairs: tuple[np.ndarray, np.ndarray] | None) -> list[int]:
@@ -115,6 +128,25 @@ def _rod_dipoles(log: FlightLog) -> list[float]:
     return dipoles.tolist()
 
 
+def _voltages_by_step(log: FlightLog) -> dict[int, np.ndarray]:
+    """What the cells read at each step of the truth that has it."""
+    if log.voltages is None:
+        return {}
+    rows, steps = log.truth_rows(log.voltages)
+    return {step: log.voltages.voltages[row] for step, row in zip(steps.tolist(), rows.tolist(), strict=True)}
+
+
+def _actuators_left(log: FlightLog) -> list[ActuatorsLeft]:
+    """The actuators that the control held for failed at every step of the truth."""
+    left = [NO_ACTUATORS_LEFT] * len(log.having("truth"))
+    if log.control is not None:
+        rows, steps = log.truth_rows(log.control)
+        wheels, rods = (getattr(log.control, name)[rows].tolist() for name in ("wheels_isolated", "rods_isolated"))
+        for step, *masks in zip(steps.tolist(), wheels, rods, strict=True):
+            left[step] = ActuatorsLeft(*masks)
+    return left
+
+
 def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b, rod_dipole: float) -> Truth:
     omega_bn_b = log.having("truth").omega_bn_b[step]
     return Truth(
@@ -125,6 +157,7 @@ def _truth(log: FlightLog, step: int, sigma_bn, momentum_b, gyro_bias_b, rod_dip
         _vec3(momentum_b),
         _vec3(gyro_bias_b),
         rod_dipole,
+        NOTHING_FAILS,
     )
 
 

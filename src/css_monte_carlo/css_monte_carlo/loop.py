@@ -20,6 +20,8 @@ from css_estimation.sun.heading_dispatch import estimate_heading
 from css_estimation.sun.sky_table import sky_at
 from css_estimation.sun.sun_heading import Aiding
 from css_monte_carlo.dispatch_by_type import command, estimate_attitude, note_estimate, tally
+from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, Uncertainty, evident_cells, failing_units
+from css_monte_carlo.named_faults import note_kinds
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
@@ -38,6 +40,7 @@ class Vehicle(NamedTuple):
 
     period_ns: int
     sensors: Sensors
+    uncertainty: Uncertainty  # of healthy cells
     own_earth: bool  # each case has its own reflectivities
     albedo_model: int  # of `albedo_vector`
     clouds: Clouds
@@ -70,6 +73,7 @@ class Cases(NamedTuple):
     speeds: np.ndarray  # (C, N) [rad/s]
     rod_dipole: np.ndarray  # (C, M) [A m^2]
     voltages: np.ndarray  # (C, n) [V]
+    healthy: np.ndarray  # (C, n) [V] what the cells of cases with faults would read without them
     rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
     faults: np.ndarray  # (C, F) of fault_effects.FAULT, of all sensors and actuators
@@ -137,7 +141,7 @@ def fly_block(
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
         field_bias_b = magnetometer.draw_bias(v.sensors.magnetometer, key)
         lags = draw_lags(v.sensors, key)
-        sensors = SensorsOfCase(key, cells, gyro_errors, field_bias_b, lags, cases.history[c])
+        sensors = SensorsOfCase(key, cells, gyro_errors, field_bias_b, lags, cases.history[c], cases.healthy[c])
         rotation, field_b, field_step = state.rotation, state.field_b, state.field_step
         heading_state, attitude_state, control_state = state.heading, state.attitude, state.control
         for k in range(marks.shape[0]):
@@ -177,9 +181,14 @@ def fly_block(
             # as the control node has it: the last measurement, for as long as the next may be on its way
             field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
             held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
-            control_state = command(
+            control_state, left = command(
                 v.control, control_state, state.control_memory, since_s, heading, speeds, held, torque, dipole
             )
+            failing = NOTHING_FAILS
+            if faults.shape[0] > 0:
+                failing = failing_units(faults, step)
+                evident = evident_cells(v.uncertainty, failing.cells, cases.healthy[c], voltages, cases.albedo[c])
+                failing = Failing(failing.cells, evident, failing.wheels, failing.rods, failing.sensors)
             momentum_b = sum_along_axes(craft.body.wheels, momentum)
             truth = Truth(
                 rotation.sigma_bn,
@@ -189,8 +198,11 @@ def fly_block(
                 momentum_b,
                 read.gyro_bias_b,
                 sum_of_sizes(dipole),
+                failing,
             )
-            tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory)
+            tally(tallies, c, step, marks[k], truth, heading, attitude, state.memory, left)
+            if faults.shape[0] > 0:
+                note_kinds(tallies, c, heading, state.heading_memory, failing.cells, faults, step, voltages)
             if trace.shape[0] > 0:
                 _note(trace[c, step], rotation, dipole, torque, speeds)
                 note_estimate(tallies, heading, attitude, trace[c, step, TRUTH_COLUMNS:])

@@ -25,6 +25,7 @@ from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
 from css_monte_carlo.case_tallies import step_marks
+from css_monte_carlo.failing_units import uncertainty_of
 from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
@@ -186,6 +187,7 @@ class MissionFlight:
             speeds=np.zeros_like(momentum),
             rod_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             voltages=np.zeros((len(keys), len(nominal))),
+            healthy=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
             faults=self._faults([], numbers),
@@ -250,6 +252,7 @@ class MissionFlight:
         return Vehicle(
             period_ns=self.mission.period_ns,
             sensors=self._sensors(values, done, is_heard),
+            uncertainty=uncertainty_of(array),
             own_earth=self._own_earth,
             albedo_model=MODELS[array.albedo.model],
             clouds=earth_reflectivity.clouds(self._array.values, self._grid),

@@ -4,6 +4,7 @@
 from typing import NamedTuple
 
 from css_common.vectors import Vec3
+from css_monte_carlo.failing_units import Failing
 
 
 class Truth(NamedTuple):
@@ -16,3 +17,4 @@ class Truth(NamedTuple):
     wheel_momentum_b: Vec3  # [N m s] of all wheels
     gyro_bias_b: Vec3  # [rad/s]
     rod_dipole: float  # [A m^2] commanded in this step, of all rods together without their signs
+    failing: Failing  # units that faults act on

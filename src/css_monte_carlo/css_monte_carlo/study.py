@@ -17,7 +17,8 @@ from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
 from css_monte_carlo.attitude_guess import takes_guess
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.direct_flight import configured, is_attitude_filter
+from css_monte_carlo.direct_flight import configured, is_attitude_filter, refuse_what_needs_the_graph
+from css_monte_carlo.drawn_faults import COLUMN, has_faults
 from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
 from css_monte_carlo.mission_parts import NoPlace, parts_of
 from css_monte_carlo.percentiles import over_cases
@@ -61,7 +62,7 @@ class Study:
         folder: where it lies.
         manifest: what was asked for.
         cases: one row per configuration and case: estimator, gyro, overrides, case and the quantities of `measures`;
-            null what is not of the kind of the estimator.
+            null what is not of the kind of the estimator. With faults in the mission, `faults` lists those of the case.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
@@ -118,6 +119,8 @@ def run_study(
     """
     configurations = tuple(configurations)
     missions = [configuration.applied(mission) for configuration in configurations]
+    for flies in missions:
+        refuse_what_needs_the_graph(flies)
     stepped = [_why_stepped(flown, c.estimator) for flown, c in zip(missions, configurations, strict=True)]
     if guess_deg > 0.0:
         for configuration, flies, reason in zip(configurations, missions, stepped, strict=True):
@@ -164,6 +167,7 @@ def run_study(
             configuration,
             ATTITUDE if configuration.estimator in filters else HEADING,
             windows_of(flown),
+            has_faults(flown),
             [_chunk_name(i, *chunk) for chunk in ranges[i]],
         )
         for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
@@ -222,6 +226,7 @@ class _Part(NamedTuple):
     configuration: Configuration
     measure: Measure
     windows: Windows
+    failing: bool
     chunks: list[str]
 
 
@@ -229,6 +234,7 @@ def _merged_cases(store: StudyFolder, parts: Sequence[_Part]) -> pa.Table:
     tables = []
     for part in parts:
         columns = ["case", *(quantity.study_column for quantity in part.measure.quantities(part.windows))]
+        columns += [COLUMN] if part.failing else []
         table = pa.concat_tables([store.read_chunk(name, columns) for name in part.chunks]).combine_chunks()
         tables.append(_labelled(part.configuration, table))
     # a sweep may change what is measured, and estimators of each kind have columns of their own

@@ -11,13 +11,15 @@ from css_common.kernel import typed_call
 from css_estimation.attitude.attitude_solution import VALIDITY_NONE, VALIDITY_VALID, AttitudeSolution
 from css_monte_carlo.attitude_tallies import SAMPLED, new_tallies, tally_step
 from css_monte_carlo.case_tallies import SUNLIT
+from css_monte_carlo.failing_units import NOTHING_FAILS
+from css_monte_carlo.health_tallies import NO_ACTUATORS_LEFT
 from css_monte_carlo.step_truth import Truth
 
 _tally = typed_call(tally_step)
 SIGMA = (0.2, -0.1, 0.3)
 BIAS = (0.001, -0.002, 0.0005)
 ZERO = (0.0, 0.0, 0.0)
-TRUTH = Truth(SIGMA, ZERO, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), ZERO, BIAS, 0.0)
+TRUTH = Truth(SIGMA, ZERO, (0.0, 0.0, 1.0), (0.0, 0.0, 1.0), ZERO, BIAS, 0.0, NOTHING_FAILS)
 STEPS, SETTLED = 40, 25
 
 
@@ -44,7 +46,9 @@ def tallied(errors, covariance, waiting=3):
         validity = VALIDITY_NONE if step < waiting else VALIDITY_VALID
         lit_mask = (1 << step % 32) - 1
         solution = AttitudeSolution(estimated, ZERO, bias_b, 0.0, 0.5 * step, 3, lit_mask, validity, 0, 1)
-        _tally(tallies, 0, step, SUNLIT if step % 2 else 0, TRUTH, None, solution, Memory(covariance))
+        _tally(
+            tallies, 0, step, SUNLIT if step % 2 else 0, TRUTH, None, solution, Memory(covariance), NO_ACTUATORS_LEFT
+        )
     return tallies
 
 

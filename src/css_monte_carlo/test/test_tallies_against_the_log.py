@@ -18,6 +18,8 @@ from css_common.kernel import typed_call
 from css_estimation.sun.sun_heading import NO_COVARIANCE, VALIDITY_VALID, SunHeading
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import FINAL, LATE, REPORTED, SUNLIT, new_tallies, step_marks, tally_step
+from css_monte_carlo.failing_units import NOTHING_FAILS
+from css_monte_carlo.health_tallies import NO_ACTUATORS_LEFT
 from css_monte_carlo.step_truth import Truth
 from css_msgs.msg import RodDipoleCommand
 
@@ -40,8 +42,8 @@ def tallied(pointing_deg, illumination, rates, period_s):
     true, estimated = tilted(pointing_deg), tilted(pointing_deg + OFF_DEG)
     for step, rate in enumerate(rates.tolist()):
         sun_b, said = tuple(true[step].tolist()), heading(estimated[step].tolist())
-        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL, DIPOLE * step)
-        _tally_step(tallies, 0, step, int(marks[step]), truth, said, None, None)
+        truth = Truth(STILL, (0.0, 0.0, rate), sun_b, UP, STILL, STILL, DIPOLE * step, NOTHING_FAILS)
+        _tally_step(tallies, 0, step, int(marks[step]), truth, said, None, None, NO_ACTUATORS_LEFT)
     (row,) = case_table(np.arange(1), tallies, period_s, WINDOWS).to_pylist()
     return row
 

@@ -4,6 +4,7 @@
 A paper is a package beside this module that has a module `paper` with
 
     TITLE: str                                        authors, title, place and year
+    CASES, QUICK_CASES: int                           flights of each configuration, if other numbers than usual
     reproduce(request: Request) -> list[Row]          writes figures and pages into `request.folder`
 
 Nothing else is edited to add one.
@@ -36,6 +37,8 @@ class Paper(NamedTuple):
     name: str
     title: str
     reproduce: Callable[[Request], Sequence[Row]]
+    cases: int | None = None  # flights of each configuration; None: as many as usual
+    quick_cases: int | None = None
 
 
 def find_paper(name: str) -> Paper:
@@ -48,4 +51,5 @@ def find_paper(name: str) -> Paper:
     if name not in names:
         raise ReproductionError(f"paper {unknown_name(name, names)} (papers: {', '.join(names)})")
     module = import_module(f"{__package__}.{name}.paper")
-    return Paper(name, module.TITLE, module.reproduce)
+    cases, quick_cases = (getattr(module, usual, None) for usual in ("CASES", "QUICK_CASES"))
+    return Paper(name, module.TITLE, module.reproduce, cases, quick_cases)

@@ -5,8 +5,10 @@ import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterator
+from typing import Protocol
 
 import zstandard
+from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import ChunkIndex, Statistics
 
@@ -19,15 +21,32 @@ _MESSAGE_FIELDS = MESSAGE_HEAD.size - RECORD_HEAD.size
 _INDEX_FIELDS = _INDEX_HEAD.size - RECORD_HEAD.size
 
 
+class Record(Protocol):
+    """Anything that can stand in a file."""
+
+    def write(self, stream: RecordBuilder) -> None:
+        """Put the record at the end of a stream."""
+
+
+def bytes_of(*records: Record) -> bytes:
+    """Records as they stand in a file."""
+    builder = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return bytes(builder.end())
+
+
 class ChunkBuilder:
     """The chunk being filled, and those that were finished.
 
     Attributes:
-        indexes: one of each finished chunk.
+        indexes: a record of each finished chunk, as they stand at the end of the file. They are held for as long as a
+            recording goes on, and would take six times the memory as Python objects.
     """
 
     def __init__(self) -> None:
-        self.indexes: list[ChunkIndex] = []
+        self.indexes = bytearray()
+        self._chunks = 0
         self._compressor = zstandard.ZstdCompressor()
         self._parts: list[bytes] = []
         self._size = 0
@@ -77,19 +96,19 @@ class ChunkBuilder:
             indexes += _INDEX_HEAD.pack(Opcode.MESSAGE_INDEX, _INDEX_FIELDS + length, channel, length)
             indexes += struct.pack(f"<{len(place)}Q", *place)
             self._counts[channel] += len(place) // 2
-        self.indexes.append(
-            ChunkIndex(
-                chunk_length=len(chunk),
-                chunk_start_offset=position,
-                compression=_COMPRESSION.decode(),
-                compressed_size=len(packed),
-                message_end_time=self._end_ns,
-                message_index_length=len(indexes),
-                message_index_offsets=offsets,
-                message_start_time=self._start_ns,
-                uncompressed_size=len(records),
-            )
+        index = ChunkIndex(
+            chunk_length=len(chunk),
+            chunk_start_offset=position,
+            compression=_COMPRESSION.decode(),
+            compressed_size=len(packed),
+            message_end_time=self._end_ns,
+            message_index_length=len(indexes),
+            message_index_offsets=offsets,
+            message_start_time=self._start_ns,
+            uncompressed_size=len(records),
         )
+        self.indexes += bytes_of(index)
+        self._chunks += 1
         self._begin_anew()
         return chunk + indexes
 
@@ -100,7 +119,7 @@ class ChunkBuilder:
             attachment_count=attachments,
             channel_count=channels,
             channel_message_counts=dict(self._counts),
-            chunk_count=len(self.indexes),
+            chunk_count=self._chunks,
             message_count=self._counts.total(),
             message_end_time=end_ns,
             message_start_time=start_ns,

@@ -11,9 +11,7 @@ import zlib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
-from mcap.data_stream import RecordBuilder
 from mcap.records import (
     Attachment,
     AttachmentIndex,
@@ -28,18 +26,13 @@ from mcap.records import (
 
 from css_recording.bag_folder import create_file
 from css_recording.bag_metadata import Topic, qos_text
-from css_recording.chunk_builder import ChunkBuilder
+from css_recording.chunk_builder import ChunkBuilder, Record, bytes_of
 from css_recording.mcap_file import MAGIC
 from css_recording.schemas import MessageSchema
 
 LIBRARY = "sunpoint css_recording"
 _MAX_CHUNK_BYTES = 1 << 20
 _CRC_BYTES = 4
-
-
-class _Record(Protocol):
-    def write(self, stream: RecordBuilder) -> None:
-        """Put the record at the end of a stream."""
 
 
 class McapOutput:
@@ -60,7 +53,7 @@ class McapOutput:
 
     def start(self) -> None:
         """Write the head of the file."""
-        self._write(MAGIC + _bytes_of(Header(profile="ros2", library=LIBRARY)))
+        self._write(MAGIC + bytes_of(Header(profile="ros2", library=LIBRARY)))
 
     def add_channel(self, topic: Topic, schema: MessageSchema) -> int:
         """Define a channel; gives its number.
@@ -69,7 +62,7 @@ class McapOutput:
         outside of chunks, so that a recording without messages is valid and one that is killed early knows its
         topics.
         """
-        new: list[_Record] = []
+        new: list[Record] = []
         if schema not in self._schemas:
             text = schema.text.encode(errors="surrogateescape")
             record = Schema(id=len(self._schemas) + 1, data=text, encoding=schema.encoding, name=schema.type_name)
@@ -85,7 +78,7 @@ class McapOutput:
             schema_id=schema_id,
         )
         self._channels.append(channel)
-        definitions = _bytes_of(*new, channel)
+        definitions = bytes_of(*new, channel)
         self._chunk.add_definitions(definitions)
         self._write(definitions)
         return channel.id
@@ -101,13 +94,13 @@ class McapOutput:
 
     def add_metadata(self, name: str, entries: Mapping[str, str]) -> None:
         """Write a named set of texts."""
-        data = _bytes_of(Metadata(name=name, metadata=dict(entries)))
+        data = bytes_of(Metadata(name=name, metadata=dict(entries)))
         self._indexes.append(MetadataIndex(offset=self._position, length=len(data), name=name))
         self._write(data)
 
     def attach(self, name: str, media_type: str, data: bytes, stamp_ns: int) -> None:
         """Write a file into the file."""
-        record = _bytes_of(
+        record = bytes_of(
             Attachment(create_time=stamp_ns, log_time=stamp_ns, name=name, media_type=media_type, data=data)
         )
         index = AttachmentIndex(
@@ -127,12 +120,12 @@ class McapOutput:
 
         copy: also written there, from the open file: it may have been deleted.
         """
-        self._write(_bytes_of(DataEnd(data_section_crc=self._crc)))
+        self._write(bytes_of(DataEnd(data_section_crc=self._crc)))
         summary = self._summary()
         # Summary offsets are optional, and nothing that reads recordings needs them.
         footer = Footer(summary_start=self._position, summary_offset_start=0, summary_crc=0)
-        footer.summary_crc = zlib.crc32(summary + _bytes_of(footer)[:-_CRC_BYTES])
-        self._write(summary + _bytes_of(footer) + MAGIC)
+        footer.summary_crc = zlib.crc32(summary + bytes_of(footer)[:-_CRC_BYTES])
+        self._write(summary + bytes_of(footer) + MAGIC)
         os.fsync(self.descriptor)
         if copy is not None:
             shutil.copyfile(f"/proc/self/fd/{self.descriptor}", copy)
@@ -148,7 +141,7 @@ class McapOutput:
         metadata = [index for index in self._indexes if isinstance(index, MetadataIndex)]
         statistics = self._chunk.statistics(len(self._schemas), len(self._channels), len(attachments), len(metadata))
         definitions = [*self._schemas.values(), *self._channels]
-        return _bytes_of(*definitions, statistics, *self._chunk.indexes, *attachments, *metadata)
+        return bytes_of(*definitions, statistics) + self._chunk.indexes + bytes_of(*attachments, *metadata)
 
     def _write(self, data: bytes) -> None:
         """Hand bytes to the operating system at once."""
@@ -156,10 +149,3 @@ class McapOutput:
         self._file.flush()
         self._crc = zlib.crc32(data, self._crc)
         self._position += len(data)
-
-
-def _bytes_of(*records: _Record) -> bytes:
-    builder = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    return bytes(builder.end())

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.case_faults import CaseFault
 from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey
@@ -13,7 +14,6 @@ from css_common.sections import PERIOD, ROD_AXES, RODS_FITTED, WHEELS_FITTED, wh
 from css_sim import faults
 from css_sim.fault_effects import DEAD, FRICTION, ROD, SLOW, WHEEL, acts, spoil
 from css_sim.fault_kinds import kinds_of
-from css_sim.faults import CaseFault
 
 KINDS = kinds_of("wheel", "rod", "tachometer")
 

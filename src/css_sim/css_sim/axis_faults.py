@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults of sensors of three axes: gyro and magnetometer."""
 
+from css_common.case_faults import CaseFault
 from css_common.fault_lines import FAULTS, Units
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
 from css_common.sections import PERIOD
 from css_sim import faults
 from css_sim.fault_kinds import AXES, kinds_of
-from css_sim.faults import CaseFault
 
 GYRO_KINDS = kinds_of("gyro")
 MAGNETOMETER_KINDS = kinds_of("magnetometer")

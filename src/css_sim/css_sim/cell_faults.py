@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.case_faults import NEVER, CaseFault, step_of
 from css_common.declared import builder, given, part, table_of
 from css_common.fault_lines import FAULTS, Units, parse_line
 from css_common.kernel import kernel
@@ -15,9 +16,8 @@ from css_common.schema import Values, choice, integer, real
 from css_common.sections import PERIOD
 from css_sensors.cells import NORMALS
 from css_sim import faults
-from css_sim.fault_effects import CELL, DEAD, NEVER, SHADOWED, STUCK, SWAPPED, acts
+from css_sim.fault_effects import CELL, DEAD, SHADOWED, STUCK, SWAPPED, acts
 from css_sim.fault_kinds import kinds_of
-from css_sim.faults import CaseFault
 
 KINDS = kinds_of("cell")
 
@@ -64,7 +64,7 @@ def drawn_faults(p: RandomFaults, cells: int, key: RandomKey, period: float) -> 
     A case with more failures has those of the case with fewer among them.
     """
     healthy = list(range(cells))
-    first = faults.step_of(p.time, period)
+    first = step_of(p.time, period)
     failed = []
     for k in range(min(p.cells, len(healthy))):
         which, kind, value, _ = uniform4(key, Stream.CELL_FAILURE, 0, _FAILURES + k)

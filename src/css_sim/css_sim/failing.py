@@ -3,15 +3,14 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
+from css_common.case_faults import CaseFault, Teller
 from css_common.codec import Sample
 from css_common.component import Component, Output
 from css_common.fault_lines import FAULTS
 from css_common.schema import Table, Values, flag
 from css_msgs.msg import Faults
-from css_sim.fault_effects import NEVER, NO_FAULTS
-from css_sim.faults import CaseFault, rows, with_held
+from css_sim.fault_effects import NO_FAULTS
+from css_sim.faults import rows, with_held
 
 REPORT = flag("report_faults", False, "tell which faults act even if none is given before the flight")
 PARAMETERS: Table = (FAULTS, REPORT)
@@ -32,12 +31,10 @@ class Failing:
         table: (F,) of `fault_effects.FAULT`.
     """
 
-    _told: tuple[CaseFault, ...] | None  # those of the last message; None: nobody has told any yet
-
     def __init__(self, faults: Sequence[CaseFault], before: "Failing | None" = None) -> None:
         """Faults from the first step on, or for a node that begins anew after those that it told `before`."""
         self._faults: Sequence[CaseFault] = ()
-        self._told = before._told if before is not None else None
+        self._teller: Teller = Teller(before._teller if before is not None else None)
         self.table = NO_FAULTS
         self.take(faults)
 
@@ -48,36 +45,4 @@ class Failing:
 
     def told(self, component: Component, stamp_ns: int) -> dict[str, Sample]:
         """A message of the faults that act at a stamp, if they are others than those of the last message."""
-        if _KEY not in component.frames or not (self._faults or self._told or self._told is None):
-            return {}
-        step = component.step_of(stamp_ns)
-        if self._told is None and step == 0:
-            self._told = ()
-        # one that begins later, restarted perhaps, may follow messages that are true no more
-        acting = tuple(fault for fault in self._faults if fault.first_step <= step < fault.end_step)
-        if acting == self._told:
-            return {}
-        self._told = acting
-        period = component.period_ns * 1e-9
-
-        def column(name: str) -> np.ndarray:
-            return np.array([getattr(fault, name) for fault in acting], np.uint32)
-
-        table = [
-            (
-                *(*fault.values, 0.0, 0.0)[:2],
-                fault.first_step * period,
-                fault.end_step * period if fault.end_step < NEVER else -1.0,
-            )
-            for fault in acting
-        ]
-        return {
-            _KEY: component.message(
-                _KEY,
-                stamp_ns,
-                sort=column("sort"),
-                unit=column("unit"),
-                kind=column("kind"),
-                rows=np.array(table, dtype=np.float64).ravel(),
-            )
-        }
+        return self._teller.told(component, _KEY, stamp_ns, self._faults)

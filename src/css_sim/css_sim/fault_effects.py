@@ -7,6 +7,7 @@ it began, for as long as its node runs.
 
 import numpy as np
 
+from css_common import link_kinds
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.vectors import Vec3
@@ -18,10 +19,14 @@ STUCK_LOW, STUCK_HIGH, WRAP, SWAPPED, SHADOWED, SILENT, FRICTION = range(11, 18)
 STUCK_RANDOM = 18  # an instruction to draw: what then acts is STUCK
 SLOW = 19  # a wheel that is saturated in speed, not in what it is commanded
 
+LATE, DROPPED, DOUBLED = link_kinds.LATE, link_kinds.DROPPED, link_kinds.DOUBLED  # of pulses, as of messages
+SPURIOUS = 29
+
 CELL, GYRO, MAGNETOMETER, WHEEL, ROD, TACHOMETER = range(6)
 """Codes of the sorts of units; never given to another either."""
 
-NEVER = 2**62
+HEAD = 9  # 6 to 8 are those of `link_kinds`
+
 _BEYOND = 1e30  # any converter's limits
 
 FAULT = np.dtype(

@@ -17,6 +17,7 @@ SORTS = {
     "wheel": effects.WHEEL,
     "rod": effects.ROD,
     "tachometer": effects.TACHOMETER,
+    "head": effects.HEAD,
 }
 AXES = ("x", "y", "z")
 
@@ -31,6 +32,7 @@ _UNITS = {  # of what a sort reads or is commanded: unit, factor to SI, largest 
 }
 _FACTOR = FaultValue(real("factor", 1.0, "-", "", low=-1e3, high=1e3))
 _SHARE = FaultValue(real("share", 0.0, "-", "", low=0.0, high=1.0))
+_DELAY = FaultValue(real("delay_us", 300.0, "us", "", low=1.0, high=1e6))
 _SPELL = FaultValue(real("spell", 0.0, "s", "", low=0.0, open_low=True, high=1e6), cycles=-1)
 
 
@@ -101,6 +103,19 @@ _WHEEL_KINDS = (
         "turns no faster than this",
     ),
 )
+_HEAD_KINDS = (
+    FaultKind("head", "dead", effects.DEAD, (), "gives no pulse"),
+    FaultKind("head", "dropped", effects.DROPPED, (_SHARE,), "this share of its pulses never comes"),
+    FaultKind("head", "doubled", effects.DOUBLED, (_SHARE, _DELAY), "this share of them comes again, so much later"),
+    FaultKind("head", "late", effects.LATE, (_DELAY,), "its pulses come so much late"),
+    FaultKind(
+        "head",
+        "spurious",
+        effects.SPURIOUS,
+        (FaultValue(real("rate", 0.0, "1/s", "", low=0.0, high=1000.0)),),
+        "gives so many pulses besides, at any time and from any slit",
+    ),
+)
 _READINGS = ("dead", "stuck", "frozen", "noisy", "drifting", "scaled", "bias", "sign", "spikes", "intermittent")
 _BY_SORT = {
     "cell": (*_READINGS, "saturated"),
@@ -113,7 +128,12 @@ _BY_SORT = {
 
 KINDS: tuple[FaultKind, ...] = tuple(
     sorted(
-        (*(_kind(sort, name) for sort, names in _BY_SORT.items() for name in names), *_CELL_KINDS, *_WHEEL_KINDS),
+        (
+            *(_kind(sort, name) for sort, names in _BY_SORT.items() for name in names),
+            *_CELL_KINDS,
+            *_WHEEL_KINDS,
+            *_HEAD_KINDS,
+        ),
         key=lambda kind: SORTS[kind.sort],
     )
 )

@@ -19,7 +19,7 @@ from css_sim.three_axes import draw_bias, read_out, reading_variance, with_noise
 
 _RADIANS_PER_SECOND = math.pi / 180.0 / 3600.0
 
-NOISE = real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3)
+NOISE = real("noise_deg_s", 0.01, "deg/s", "1 sigma of the white noise of a sample", low=0.0, high=1e3, tunable=True)
 
 
 def _per_second(rate_deg_h: float) -> float:

@@ -13,7 +13,7 @@ from css_sim import three_axes
 from css_sim.fault_effects import MAGNETOMETER, spoil_axes
 from css_sim.three_axes import read_out, reading_variance, with_noise
 
-NOISE = real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6)
+NOISE = real("noise_nt", 200.0, "nT", "1 sigma of the white noise of a sample", low=0.0, high=1e6, tunable=True)
 
 
 class Magnetometer(NamedTuple):

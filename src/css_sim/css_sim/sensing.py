@@ -61,6 +61,7 @@ class SensorsOfCase(NamedTuple):
     field_bias_b: Vec3  # [T]
     lags: Vec3  # [cycles] of cells, gyro and magnetometer
     history: np.ndarray  # (L,) of latency.MOMENT, written
+    healthy: np.ndarray  # (N,) outputs of the cells without their faults, written where some unit has faults
 
 
 class Readings(NamedTuple):
@@ -143,6 +144,9 @@ def sense(
             of_field = sensed(case.history, step, case.lags[2], now, p.field_since)
             field_dcm_bn, field_n = mrp_to_dcm(of_field.sigma_bn), of_field.field_n
     sense_cells(p.cells, case.cells, case.key, step, dcm_bn, sun_b, intensity, p.earthlit, light, voltages_out)
+    if case.cells.faults.shape[0] > 0:
+        none, albedo = case.cells.faults[:0], case.cells.albedo
+        sun_cells.sample(p.cells, case.cells.cells, none, case.key, step, sun_b, intensity, albedo, case.healthy)
     bias_b = gyro.bias_at(p.gyro, case.gyro, case.key, step)
     gyro_b, field_b = _NOTHING, _NOTHING
     gyro_speaks = p.gyro_on and not is_silent(case.cells.faults, GYRO, step)

@@ -16,10 +16,14 @@ class SlitTimer(NamedTuple):
     """Frequency and errors; times in seconds."""
 
     frequency: float = computed(timer_frequency)  # [Hz]
-    jitter: float = made(seconds, real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4))
-    missed: float = given(real("missed", 0.0, "-", "probability that a crossing gives no pulse", low=0.0, high=1.0))
+    jitter: float = made(
+        seconds, real("jitter_us", 0.0, "us", "1 sigma of the delay of a pulse", low=0.0, high=1e4, tunable=True)
+    )
+    missed: float = given(
+        real("missed", 0.0, "-", "probability that a crossing gives no pulse", low=0.0, high=1.0, tunable=True)
+    )
     double: float = given(
-        real("double", 0.0, "-", "probability that a crossing gives a second pulse", low=0.0, high=1.0)
+        real("double", 0.0, "-", "probability that a crossing gives a second pulse", low=0.0, high=1.0, tunable=True)
     )
     double_delay: float = made(
         seconds, real("double_delay_us", 300.0, "us", "delay of a second pulse behind the first", low=1.0, high=1e5)

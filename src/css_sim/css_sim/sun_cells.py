@@ -31,7 +31,7 @@ from css_sim.cell_faults import light_left
 from css_sim.fault_effects import CELL, SHADOWED, any_acts, spoil
 from css_sim.white_noise import add_noise
 
-NOISE = real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0)
+NOISE = real("noise", 0.0, "-", "1 sigma of the white noise of each sample", low=0.0, high=1.0, tunable=True)
 OUTPUT_LOW = real("output_low", 0.0, "-", "lowest output", low=-10.0, high=10.0)
 OUTPUT_HIGH = real("output_high", 2.0, "-", "highest output", low=-10.0, high=10.0)
 
@@ -47,7 +47,7 @@ class SunCells(NamedTuple):
     cos_half_view: float = computed(half_view_cosine)
     warp: bool = given(flag("warp", True, "flattened response of O'Keefe & Schaub 2013, Eq. 16"))
     degradation: float = given(
-        real("degradation", 0.05, "-", "largest loss of output, drawn anew every step", low=0.0, high=1.0)
+        real("degradation", 0.05, "-", "largest loss of output, drawn anew every step", low=0.0, high=1.0, tunable=True)
     )
     degradation_per_cell: bool = made(
         lambda word: word == "per_cell",

@@ -11,6 +11,8 @@ from faults import values_of
 from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
+from css_common import link_kinds
+from css_common.case_faults import NEVER
 from css_common.codec import Sample, codec_of
 from css_common.fault_lines import parse_line
 from css_common.random_streams import random_key
@@ -46,7 +48,7 @@ EXPECTED: dict[str, Callable[..., float]] = {
 FACTOR: dict[str, Callable[..., float]] = {"scaled": lambda x, steps, factor: factor * x}  # whose values have no unit
 DRAWN = {"noisy", "spikes", "intermittent", "stuck_random"}
 OF_THEIR_OWN = {"frozen", "silent", "swapped", "shadowed", "friction"}
-NOT_OF_COMMANDS = {("wheel", "dead"), ("wheel", "saturated")}
+NOT_OF_COMMANDS = {("wheel", "dead"), ("wheel", "saturated"), ("head", "dead")}
 
 
 def lines_of(*lines, kinds=KINDS, key=KEY):
@@ -68,18 +70,19 @@ def spoiled(table, sort, step, values):
 
 
 def test_all_kinds_are_tested_here_and_numbered_once():
-    assert {kind.name for kind in KINDS} == {*EXPECTED, *FACTOR, *DRAWN, *OF_THEIR_OWN}
+    assert {kind.name for kind in KINDS if kind.sort != "head"} == {*EXPECTED, *FACTOR, *DRAWN, *OF_THEIR_OWN}
     assert (
         len({(kind.sort, kind.name) for kind in KINDS}) == len({(kind.sort, kind.code) for kind in KINDS}) == len(KINDS)
     )
 
 
 def test_messages_have_the_same_numbers():
-    for name, code in SORTS.items():
+    for name, code in (SORTS | link_kinds.SORTS).items():
         assert getattr(Faults, f"SORT_{name.upper()}") == code
     told = {code for name in dir(Faults) if name.startswith("KIND_") for code in [getattr(Faults, name)]}
-    assert told == {kind.code for kind in KINDS} - {effects.STUCK_RANDOM}
-    assert all(getattr(Faults, name) == getattr(effects, name[5:]) for name in dir(Faults) if name.startswith("KIND_"))
+    assert told == {kind.code for kind in (*KINDS, *link_kinds.KINDS)} - {effects.STUCK_RANDOM}
+    codes = vars(link_kinds) | vars(effects)
+    assert all(getattr(Faults, name) == codes[name[5:]] for name in dir(Faults) if name.startswith("KIND_"))
 
 
 @pytest.mark.parametrize(
@@ -237,7 +240,7 @@ def drawn(*lines, cases=3000):
 def test_a_chance_is_the_share_of_cases():
     happened = drawn("cell.1 dead from 2 chance 0.3")["first_step"][:, 0] == 20
     assert stats.binomtest(int(happened.sum()), len(happened), 0.3).pvalue > SIGNIFICANCE
-    assert np.all(drawn("cell.1 dead chance 0", cases=50)["first_step"] == effects.NEVER)
+    assert np.all(drawn("cell.1 dead chance 0", cases=50)["first_step"] == NEVER)
 
 
 def test_targets_and_times_are_uniform_and_independent():

@@ -180,4 +180,4 @@ def test_drawn_failures_are_those_of_the_case_and_stay_when_faults_are_set_in_fl
 )
 def test_wrong_values_are_refused_with_their_name(kind, given, message):
     values = okeefe_values(kind.table(), **{name.replace(".", "__"): value for name, value in given.items()})
-    assert any(message in conflict for conflict in all_conflicts(kind, values))
+    assert any(message in conflict for conflict in all_conflicts(kind, values, "x"))

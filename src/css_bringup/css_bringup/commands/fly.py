@@ -3,7 +3,7 @@
 
 import sys
 
-from css_bringup.options import add_domain_option, add_mission_options, add_output_options, guarded
+from css_bringup.options import add_domain_option, add_mission_options, add_output_options, add_security_option, guarded
 from css_common.command import CommandParser, command_parser, implementation
 
 _EXAMPLES = (
@@ -25,6 +25,7 @@ def _parser() -> CommandParser:
     )  # fmt: skip
     parser.add_argument("--no-record", action="store_true", help="fly without a recording and figures of merit")
     add_domain_option(parser)
+    add_security_option(parser)
     add_output_options(parser)
     return parser
 

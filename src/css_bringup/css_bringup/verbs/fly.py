@@ -2,17 +2,20 @@
 """Flies a mission, and says what came of it."""
 
 import argparse
+import os
 
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
-from css_bringup.faults_flown import faults_flown
+from css_bringup.faults_flown import NOTHING_FLOWN, faults_flown
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
 from css_bringup.options import complain, console, errors
+from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
 from css_recording.errors import BagError
@@ -24,7 +27,12 @@ def run(arguments: argparse.Namespace) -> int:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
-    with own_domain(mission, arguments.domain, bag, console) as domain:
+    nodes = [*(node.name for node in mission.nodes), RECORDER]
+    enclaves = security.enclaves_of(nodes, arguments.processes)
+    with (
+        security.enforced(os.environ, arguments.security, enclaves),
+        own_domain(mission, arguments.domain, bag, console) as domain,
+    ):
         result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
     result.domain = domain
     return conclude(mission, result, as_json=arguments.json)
@@ -33,17 +41,22 @@ def run(arguments: argparse.Namespace) -> int:
 def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     """Prints a flight's result and turns it into an exit code."""
     runs: list[Run] = []
-    faults: list[str] = []
+    failed = NOTHING_FLOWN
     if result.bag is not None and result.steps > 0:
         try:
             log = read_flight(result.bag)
-            runs, faults = estimator_runs(log), faults_flown(log, result.bag)
+            runs, failed = estimator_runs(log), faults_flown(log, result.bag)
         except BagError as error:
             # a recorder that died leaves such a recording, and why it died is the better news
             result.failure = result.failure or str(error)
     print_result(console, result, runs)
-    for line in faults:
+    for line in failed.faults:
         console.print(f"fault: {line}", soft_wrap=True, highlight=False)
+    for found in failed.detections:
+        console.print(f"detection: {found.text()}", soft_wrap=True, highlight=False)
+    for line in failed.warnings:
+        complain("warning:", line)
+    result.warnings += failed.warnings
     spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
     for line in spin_lines(spinning) if spinning is not None else ():
         console.print(line, soft_wrap=True)
@@ -55,7 +68,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     if as_json:
         print_json(
             flight_object(result, runs)
-            | {"faults": faults}
+            | {"faults": failed.faults, "detections": failed.objects()}
             | ({} if spinning is None else {"spin": spin_object(spinning)})
         )
     if result.interrupted:

@@ -3,7 +3,7 @@
 
 import argparse
 
-from css_analysis.flight_summary import summary_table
+from css_analysis.flight_summary import isolated_lines, summary_table
 from css_bringup.options import complain, console
 from css_bringup.replay_bag import ReplayResult, default_replay, mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
@@ -53,6 +53,8 @@ def _remapping(text: str) -> tuple[str, str]:
 def print_replay(result: ReplayResult) -> None:
     """The comparison as a table, with what was refused and whether bytes are as they flew."""
     console.print(summary_table(result.runs))
+    for line in isolated_lines(result.runs):
+        console.print(line, soft_wrap=True, highlight=False)
     console.print(f"mission: {result.mission.origin}", soft_wrap=True)
     if result.log.imported:
         console.print("imported telemetry: errors over all lines; of arrays, orbit and shadow nothing is known")

@@ -10,9 +10,8 @@ from css_common.command import CommandParser, command_parser, guarded, implement
 from css_common.mission_file import MissionError
 from css_monte_carlo.errors import StudyError
 from css_papers.errors import ReproductionError
-from css_papers.paper_names import paper_names
+from css_papers.paper_names import CASES, QUICK_CASES, paper_names
 
-CASES, QUICK_CASES = 1000, 40
 _EXAMPLES = ("okeefe", "clark --quick", "digregorio --cases 200 --out reports/mine")
 _EXITS = {0: "done, also when numbers miss", 2: "an argument or the folder is wrong"}
 
@@ -21,7 +20,10 @@ def _parser() -> CommandParser:
     parser = command_parser("css_papers", "reproduce", __doc__, _EXAMPLES, _EXITS)
     parser.add_argument("paper", metavar="PAPER", help=f"one of: {', '.join(paper_names())}")
     parser.add_argument(
-        "--cases", type=int, metavar="N", help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES})"
+        "--cases",
+        type=int,
+        metavar="N",
+        help=f"flights of each configuration (default: {CASES}, quick: {QUICK_CASES}; faults: fewer)",
     )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder of the page (default: reports/PAPER)")
     parser.add_argument("--quick", action="store_true", help="a first look: few cases, no side studies")
@@ -33,8 +35,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     parser = _parser()
     options = parser.parse_args(arguments)
-    if options.cases is None:
-        options.cases = QUICK_CASES if options.quick else CASES
     # a killed terminal or `kill` end it as Ctrl-C does: finished flights stay
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     wrong = (ReproductionError, MissionError, StudyError, OSError)

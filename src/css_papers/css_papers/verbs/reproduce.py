@@ -14,6 +14,7 @@ from css_common.preflight import reported
 from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.study import Progress
 from css_papers.errors import ReproductionError
+from css_papers.paper_names import CASES, QUICK_CASES
 from css_papers.papers import Paper, Request, find_paper
 from css_papers.rows import Row, full_name, number, printed, row_object
 
@@ -22,6 +23,8 @@ def run(options: argparse.Namespace) -> int:
     """Flies the paper that the options name; the exit code."""
     paper = find_paper(options.paper)
     cases = options.cases
+    if cases is None:
+        cases = (paper.quick_cases or QUICK_CASES) if options.quick else (paper.cases or CASES)
     if not 1 <= cases <= 2**32:
         raise ReproductionError(f"--cases: {cases} given, expected 1 to {2**32}")
     folder = options.out or places.results("reports") / paper.name

@@ -83,6 +83,11 @@ class CssArray(Component):
     def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
         return noise_findings(NOISE, node.values, LOUDEST_CELL)
 
+    @property
+    def albedo(self) -> np.ndarray:
+        """Light of the Earth (N,) on the cells in the last cycle [-]."""
+        return self._cells.albedo
+
     def configure(self) -> None:
         values = self.values
         self._key = random_key(values[SEED], values[CASE])
@@ -111,6 +116,7 @@ class CssArray(Component):
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._p = sun_cells.parameters(values)
         self._failing.take(cell_faults.case_faults(values, self._key))
         self._cells = self._cells._replace(faults=self._failing.table)
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from sensor_msgs.msg import Imu
 
+from css_common.case_faults import CaseFault
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.fault_lines import Units
@@ -21,7 +22,6 @@ from css_sim import axis_faults, failing, gyro, latency
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
 from css_sim.fault_effects import GYRO, is_silent
-from css_sim.faults import CaseFault
 from css_sim.sensor_checks import LOUDEST_GYRO_DEG_S, noise_findings
 
 _NOTHING = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -60,15 +60,19 @@ class Gyro(Component):
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
         self._failing = Failing(self._case_faults(), self._failing)
-        self._p = gyro.parameters(self.values)
+        self._take_noise()
         self._errors = gyro.draw_errors(self._p, self._key)
         self._measure = typed_call(gyro.measure)
         self._delayed = Delayed(latency.parameters(self.values), self._key, latency.GYRO)
-        self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._take_noise()
         self._failing.take(self._case_faults())
+
+    def _take_noise(self) -> None:
+        self._p = gyro.parameters(self.values)
+        self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def _case_faults(self) -> list[CaseFault]:
         return axis_faults.case_faults(self.values, "gyro", self._key)

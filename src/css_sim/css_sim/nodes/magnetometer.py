@@ -7,6 +7,7 @@ import numpy as np
 from sensor_msgs.msg import MagneticField
 
 from css_common.attitude import mrp_to_dcm
+from css_common.case_faults import CaseFault
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.fault_lines import Units
@@ -21,7 +22,6 @@ from css_sim import axis_faults, failing, latency, magnetometer
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
 from css_sim.fault_effects import MAGNETOMETER, is_silent
-from css_sim.faults import CaseFault
 from css_sim.latency import Moment
 from css_sim.sensing import sense_field
 from css_sim.sensor_checks import LOUDEST_FIELD_NT, noise_findings
@@ -66,14 +66,18 @@ class Magnetometer(Component):
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
         self._failing = Failing(self._case_faults(), self._failing)
-        self._p = magnetometer.parameters(self.values)
+        self._take_noise()
         self._bias_b = magnetometer.draw_bias(self._p, self._key)
         self._delayed = Delayed(latency.parameters(self.values), self._key, latency.MAGNETOMETER)
-        self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
     def tune(self, values: Values) -> None:
         super().tune(values)
+        self._take_noise()
         self._failing.take(self._case_faults())
+
+    def _take_noise(self) -> None:
+        self._p = magnetometer.parameters(self.values)
+        self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
     def _case_faults(self) -> list[CaseFault]:
         return axis_faults.case_faults(self.values, "magnetometer", self._key)

@@ -8,6 +8,7 @@ import numpy as np
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
+from css_common.fault_lines import Units
 from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
@@ -17,8 +18,10 @@ from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import SlitPulse, SlitPulses, SpacecraftState
 from css_sensors.payload import needed_of_payload
 from css_sensors.slits import HEAD_AZIMUTHS, SLITS_PER_HEAD, TIMER_SPAN
-from css_sim import slit_timer
+from css_sim import failing, slit_faults, slit_timer
+from css_sim.failing import Failing, fault_outputs
 from css_sim.slit_crossings import slit_crossings, slit_geometry
+from css_sim.slit_faults import Cycle, FaultyHeads, Pulse
 from css_sim.spinning_payload import payload_motion, payload_state
 
 _SUNLIT = 0.5
@@ -33,7 +36,9 @@ class SlitSensor(Component):
     """
 
     shared = ("orbit", "payload", "slits")
-    parameters = slit_timer.PARAMETERS
+    parameters = (*slit_timer.PARAMETERS, *failing.PARAMETERS)
+    fault_kinds = slit_faults.KINDS
+    _failing = Failing(())  # of a node that has not begun
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -42,7 +47,12 @@ class SlitSensor(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("step", "slits/step", SlitPulses), Output("pulse", "slits/pulse", SlitPulse, events=True))
+        pulses = Output("step", "slits/step", SlitPulses), Output("pulse", "slits/pulse", SlitPulse, events=True)
+        return (*pulses, *fault_outputs(name, values))
+
+    @classmethod
+    def fault_units(cls, values: Values) -> Units:
+        return slit_faults.units(values)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -52,6 +62,9 @@ class SlitSensor(Component):
         values = self.values
         self._key = random_key(values[SEED], values[CASE])
         self._timer = slit_timer.parameters(values)
+        faults = slit_faults.case_faults(values, self._key)
+        self._failing = Failing(faults, self._failing)
+        self._heads_in_flight = FaultyHeads(faults, self._key, self._timer.frequency)
         self._motion = payload_motion(values, self.epoch_ns, self._key)
         self._geometry = slit_geometry(values)
         turns = self._motion.fastest * values[PERIOD] / (2.0 * np.pi)
@@ -64,6 +77,13 @@ class SlitSensor(Component):
         # compiled here, not at the first stamp: the loop would wait
         self._pulses_between((1.0, 0.0, 0.0), 0, 0.0, 0.0)
 
+    def tune(self, values: Values) -> None:
+        super().tune(values)
+        self._timer = slit_timer.parameters(values)
+        faults = slit_faults.case_faults(values, self._key)
+        self._failing.take(faults)
+        self._heads_in_flight.faults = faults
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]
         assert truth is not None  # a required input
@@ -73,7 +93,27 @@ class SlitSensor(Component):
         if truth.illumination > _SUNLIT:
             start = max((stamp_ns - self.period_ns - self.epoch_ns) * 1e-9, 0.0)
             pulses = self._pulses_between(vector_of(truth.sun_n), self.step_of(stamp_ns), start, end)
-        return self._messages(stamp_ns, self._ticks[:pulses], self._codes[:pulses])
+        ticks, codes = self._ticks[:pulses], self._codes[:pulses]
+        faults = self._heads_in_flight
+        if faults.is_needed:
+            ticks, codes = self._spoiled(faults, stamp_ns, ticks, codes)
+        return {**self._messages(stamp_ns, ticks, codes), **self._failing.told(self, stamp_ns)}
+
+    def _spoiled(
+        self, faults: FaultyHeads, stamp_ns: int, ticks: np.ndarray, codes: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Counts and codes of the pulses that come in spite and because of faults."""
+        cycle = Cycle(
+            self.step_of(stamp_ns), self._count_at(stamp_ns - self.period_ns) + 1, self._count_at(stamp_ns) + 1
+        )
+        given = [Pulse(t, *c) for t, c in zip(ticks.tolist(), codes.tolist(), strict=True)]
+        come = faults.pulses(cycle, given)
+        return np.array([p.ticks for p in come], np.int64), np.array([p[1:] for p in come], np.int64).reshape(-1, 2)
+
+    def _count_at(self, stamp_ns: int) -> int:
+        """Whole counts since the epoch at a stamp."""
+        # a millionth of a count, so that rounding does not cut a count that ends at the stamp
+        return int((stamp_ns - self.epoch_ns) * self._timer.frequency * 1e-9 + 1e-6)
 
     def _pulses_between(self, sun_n: Vec3, step: int, start: float, end: float) -> int:
         """Writes the pulses of one step into ticks and codes; returns their number."""
@@ -87,7 +127,7 @@ class SlitSensor(Component):
         return pulses
 
     def idle(self, stamp_ns: int, received: Received) -> Outgoing:
-        return self._messages(stamp_ns, self._ticks[:0], self._codes[:0])
+        return {**self._messages(stamp_ns, self._ticks[:0], self._codes[:0]), **self._failing.told(self, stamp_ns)}
 
     def _check(self, truth: Sample, elapsed_s: float) -> None:
         of_truth = np.array(self._to_dcm(vector_of(truth.sigma_bn)))
@@ -100,8 +140,7 @@ class SlitSensor(Component):
             )
 
     def _messages(self, stamp_ns: int, ticks: np.ndarray, codes: np.ndarray) -> Outgoing:
-        # a millionth of a count, so that rounding does not cut a count that ends at the stamp
-        timer = int((stamp_ns - self.epoch_ns) * self._timer.frequency * 1e-9 + 1e-6) % TIMER_SPAN
+        timer = self._count_at(stamp_ns) % TIMER_SPAN
         step = self.message(
             "step",
             stamp_ns,
