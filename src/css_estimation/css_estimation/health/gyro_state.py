@@ -27,6 +27,8 @@ GYRO_TRUSTED, GYRO_CORRECTED, GYRO_LEFT = range(3)
 _SIGMAS = 6.0
 # Innovations averaged over ten blocks of two components.
 _NIS_DEGREES = 2.0 * 19.0
+# What the light of the Earth makes of directions to the Sun is no white noise: twice their sigma.
+_OTHER_ERRORS = 4.0
 # Of the largest bias, beyond which there is no bias that is taken off.
 _SIGMAS_OF_BIAS = 2.0
 _LONGEST_TRIAL = 3600.0  # [s]
@@ -82,11 +84,11 @@ class GyroHealthParameters(NamedTuple):
         square,
         real("health.gyro.return_sigmas", 3.0, "-", "within so many it is right again", low=1.0, high=100.0),
     )
-    largest_nis: float = computed(lambda values: gamma_quantile(_NIS_DEGREES, _SIGMAS))
+    largest_nis: float = computed(lambda values: _OTHER_ERRORS * gamma_quantile(_NIS_DEGREES, _SIGMAS))
     largest_misfit: float = given(
         real(
             "health.gyro.misfit",
-            1.0,
+            2.0,
             "-",
             "squared sigmas per cell, averaged, beyond which cells contradict a Sun line that the gyro leads",
             low=0.01,
