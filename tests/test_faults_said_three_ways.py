@@ -132,6 +132,6 @@ def test_faults_of_messages_and_clocks_too(tmp_path):
     same_but_told(
         tmp_path / "script", tmp_path / "live", lambda topic: topic == "/parameter_events" or topic.endswith("/link")
     )
-    flown = faults_flown(read_flight(tmp_path / "live"), tmp_path / "live")
+    flown = faults_flown(read_flight(tmp_path / "live"), tmp_path / "live").faults
     assert len(flown) == len(OF_LINKS)
     assert all("; set in flight at about " in line for line in flown)

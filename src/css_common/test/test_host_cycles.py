@@ -88,6 +88,7 @@ def test_each_message_gives_one_estimate_of_its_stamp_and_frame(rig):
         "active",
         {"cycles": 5, "voltages.accepted": 5, "unmatched": 0, "time_set_back": 0},
         T0 + 4 * STEP,
+        (),
     )
 
 

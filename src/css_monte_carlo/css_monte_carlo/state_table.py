@@ -14,7 +14,7 @@ from numba.extending import intrinsic
 
 from css_common.kernel import study_kernel
 
-_ROW_BYTES = 4096
+_ROW_BYTES = 8192
 
 
 class StateTable:

@@ -40,6 +40,8 @@ from css_estimation.sun.direction_grid import direction
 from css_estimation.sun.sunline_filter import propagate
 from css_estimation.symmetric import isotropic, trace
 
+MOST_AT_ONCE = 0.5
+"""Time [s] that one look counts for, however long after the last."""
 _LONGEST = 10.0  # [s] beyond it nothing is known of how the body turned
 _USELESS = 0.5  # [rad^2] of a direction that has to be looked for anew
 _NOISE, _NOISE_WITHOUT_RATE = 0.02**2, 0.1**2  # [rad^2/s]
@@ -56,7 +58,8 @@ _BRIGHT = 0.45  # of the light
 _FADED = 0.75  # share of the light below which it sets
 _LONGEST_FADE = 15.0  # [s] after which it does not
 _LIGHT_MEMORY = 20.0  # [s]
-_UNEXPLAINED = 5.0  # squared sigmas of all cells together
+UNEXPLAINED = 5.0
+"""Squared sigmas of all cells together beyond which a direction does not explain them."""
 _DOUBT = 20.0  # [s]
 _WORTH = 60.0  # squared sigmas that a direction is worth which has been sure for long
 _CALM, _CALM_ENOUGH = 30.0, 10.0  # [s]
@@ -150,7 +153,7 @@ def looked(
         share = 1.0
     seen = _seen(p, memory, track, share)
     settled = track.phase == PHASE_SETTLED
-    unexplained = cost(p, memory.used, track.sun_b, track.covariance, track.light) > _UNEXPLAINED and not fades
+    unexplained = cost(p, memory.used, track.sun_b, track.covariance, track.light) > UNEXPLAINED and not fades
     # a direction on which most agree stays as sure as it was
     calm = track.calm
     if not unexplained and seen.support >= 2 and rate_sure:
@@ -164,7 +167,7 @@ def looked(
         sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, gate, not settled)
         light = _light(p, memory, track, window)
     if settled:
-        beyond = score_cells(p, memory, track, window, step, share, seen.support > 0 and not fades)
+        beyond = score_cells(p, memory, track, min(window, MOST_AT_ONCE), step, share, seen.support > 0 and not fades)
         # a direction that has been right for long is
         if beyond > 0 and track.calm >= _CALM_ENOUGH:
             leave_out_scored(p, memory, step)

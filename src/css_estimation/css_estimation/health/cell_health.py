@@ -24,7 +24,7 @@ from css_estimation.health.cell_evidence import (
     judge_in_the_dark,
     judge_signals,
 )
-from css_estimation.health.cell_following import carried, looked
+from css_estimation.health.cell_following import MOST_AT_ONCE, carried, looked
 from css_estimation.health.cell_memory import (
     PHASE_LOOKING,
     PHASE_SETTLED,
@@ -126,7 +126,7 @@ def _look(
             bright += 1
     # one cell that is bright in the shadow fails; of several, the model of the orbit does
     if night and bright < 2:
-        judge_in_the_dark(p, memory, window, step)
+        judge_in_the_dark(p, memory, min(window, MOST_AT_ONCE), step)
     elif top > p.minimum and (bright > 1 or not (sky.known and sky.illumination < 1.0)):
         track = looked(p, memory, track, window, rate_sure, step)
     judge_signals(p, memory, step)

@@ -25,6 +25,7 @@ from css_common.health import (
 from css_common.kernel import kernel
 from css_estimation.health.cell_memory import LEAPING, OUT_OF_RANGE, STUCK, CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
+from css_estimation.sun.cell_layout import READABLE
 
 _DARK = 0.05
 _SAME = 1e-9
@@ -43,7 +44,7 @@ def forget_sums(cell) -> None:
     cell.compared = cell.agreed = cell.dark_seen = cell.lit_seen = cell.leaps = 0.0
     cell.expected = cell.expected2 = cell.cross = cell.off = cell.off2 = 0.0
     cell.off_time = cell.time = cell.time2 = cell.told = 0.0
-    cell.night = cell.night_read = cell.sun_read2 = cell.sun_off = cell.sun_off2 = 0.0
+    cell.night = cell.night_read = cell.night_read2 = cell.sun_read2 = cell.sun_off = cell.sun_off2 = 0.0
     cell.least, cell.most = math.inf, -math.inf
 
 
@@ -63,7 +64,8 @@ def add_output(cell, v: float, dt: float) -> None:
     if dark:
         cell.zeros += 1.0
     predicted = cell.predicted
-    if math.isnan(predicted):
+    # at the limit of what is looked at an output tells no more by how much it is off
+    if math.isnan(predicted) or not abs(v) < READABLE:
         return
     off = v - predicted
     cell.off_time += off * cell.seconds
@@ -75,6 +77,7 @@ def add_output(cell, v: float, dt: float) -> None:
     if not predicted > _DARK:
         cell.night += 1.0
         cell.night_read += v
+        cell.night_read2 += v * v
         return
     cell.compared += 1.0
     cell.sun_read2 += v * v
@@ -156,11 +159,9 @@ def _by_least_squares(cell) -> int:
     # in the Sun: squares that are left by v = k e
     scaled = cell.sun_read2 - cell.cross * cell.cross / max(cell.expected2, 1e-9)
     grown = abs(slope) * cell.seconds > max(_GROWN, 0.5 * abs(cell.off) / n)
-    if (
-        grown
-        and growing < 0.2 * constant
-        and growing < scaled + cell.night_read * cell.night_read / max(cell.night, 1.0)
-    ):
+    # no share of anything explains what is read without the Sun
+    unexplained = scaled + cell.night_read2
+    if grown and growing < min(0.2 * constant, unexplained):
         return KIND_DRIFTING
     # what is read without the Sun is no share of anything; the Earth gives less
     if cell.night > _FEW_CYCLES and abs(cell.night_read) > _MORE_THAN_EARTH * cell.night:

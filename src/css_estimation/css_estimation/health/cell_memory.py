@@ -43,6 +43,7 @@ WATCHED = np.dtype(
         ("tops", np.float64),  # cycles in which it read the most
         ("night", np.float64),  # cycles in which no Sun was predicted on it
         ("night_read", np.float64),  # sum of outputs in them
+        ("night_read2", np.float64),  # of their squares
         ("compared", np.float64),  # cycles in which some was, and sums over them
         ("dark_seen", np.float64),  # cycles in which it was dark and should have been lit
         ("lit_seen", np.float64),  # in which it was lit and should have been

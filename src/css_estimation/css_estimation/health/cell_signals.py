@@ -23,6 +23,7 @@ _KEPT = 0.9  # of counts of recent cycles
 _MOST_LEAPS, _MOST_OUT_OF_RANGE = 3.5, 2.5
 _UNLIKELY = 14.0  # -ln of a chance of 1e-6
 _LIT = 0.1  # output above which a cell tells how others change
+_EDGES = 0.6  # [1/s] leaps of a healthy cell of a body that wobbles, as edges of its view pass the Sun
 _FULL = 0.9  # above it the largest output that any cell has had may be the converter's
 _DARK = 0.05  # below which nothing need change
 _STEPS = 3.0  # of a converter that the ripple of others has to exceed before an output has to change
@@ -94,7 +95,7 @@ def note_outputs(
             if not math.isnan(second):
                 largest = max(v, cell.last, cell.before)
                 if second > max(_LEAP * p.noise, _LEAP_SHARE * largest) + 3.0 * turn * turn:
-                    cell.jumps += 1.0
+                    cell.jumps += 1.0 / (1.0 + _EDGES * dt)
                     cell.leaps += 1.0
                 cell.ripple = 0.95 * cell.ripple + 0.05 * min(second, _LEAP_SHARE * largest)
             if v != cell.last:

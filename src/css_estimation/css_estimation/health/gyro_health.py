@@ -5,7 +5,7 @@ Modes and remedies stand in `gyro_state`. The Sun tells of two axes; of that alo
 jumps, until the line has moved through the body. Without the Sun nothing is judged but samples, and all verdicts stand.
 """
 
-from css_common.health import EVIDENCE_DEAD, EVIDENCE_NOISE, EVIDENCE_SUN, KIND_SILENT, hold
+from css_common.health import EVIDENCE_DEAD, EVIDENCE_NOISE, EVIDENCE_SUN, KIND_SILENT, hold, release
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, add, matmul, multiply, scale
 from css_estimation.health.gyro_bias import corrected
@@ -44,10 +44,9 @@ def _not_given(
         for i in range(3):
             forget_samples(axes[i])
             hold(verdicts[i], KIND_SILENT, EVIDENCE_DEAD, silent, p.silence, step)
-        opinion = leave(p, opinion, fits, opinion.claim)
     readings = Readings(r.rate_b, r.before_b, r.dt, True, silent)
     state = GyroState(readings, opinion, interrupted(state.sight))
-    return state, r.rate_b, False, opinion.mode == GYRO_LEFT
+    return state, r.rate_b, False, silent > p.silence or opinion.mode == GYRO_LEFT
 
 
 @kernel
@@ -116,6 +115,11 @@ def check_gyro(
     r = state.readings
     rate_b, reading = check_samples(p.checks, axes, verdicts, r.silent + dt, step, gyro_b, r.rate_b)
     opinion = state.opinion
+    if r.silent > p.silence:
+        # one that speaks again says what it said before: silence is no lie
+        for i in range(3):
+            if verdicts[i].held != 0 and verdicts[i].kind == KIND_SILENT:
+                release(verdicts[i])
     if reading == READING_ABSENT:
         return state, rate_b, False, opinion.mode == GYRO_LEFT
     line = state.sight

@@ -154,6 +154,12 @@ def contradicts(led: Led) -> bool:
 
 
 @kernel
+def waiting(led: Led) -> Led:
+    """Begins anew when the Sun has been in sight for long."""
+    return Led(led.filter, 0.0, -_SETTLING, 0)
+
+
+@kernel
 def _begin(led: Led, glimpse: Glimpse, strikes: int) -> Led:
     covariance = add_outer(glimpse.covariance, _ALONG, glimpse.sun_b)
     return Led(_begun(led.filter, glimpse.sun_b, covariance), 0.0, 0.0, strikes)

@@ -24,10 +24,12 @@ from css_estimation.health.aiding_health import (
     Trusted,
     check_aiding,
 )
+from css_estimation.health.cell_following import UNEXPLAINED
 from css_estimation.health.cell_health import watch_cells
-from css_estimation.health.cell_memory import PHASE_LOOKING, CellHealthMemory, CellHealthState
+from css_estimation.health.cell_memory import PHASE_LOOKING, CellHealthMemory, CellHealthState, Track
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
-from css_estimation.health.gyroless_sight import Gyroless, Led, contradicts, follow_gyro, look
+from css_estimation.health.cell_search import cost
+from css_estimation.health.gyroless_sight import Glimpse, Gyroless, Led, contradicts, follow_gyro, look, waiting
 from css_estimation.sun import heading_dispatch
 from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
@@ -114,6 +116,11 @@ def initial_memory(algorithm: Any, p: Any) -> Any:
     )
 
 
+def own_of(p: Any, memory: Any) -> tuple[Any, Any]:
+    """Parameters and memory of the algorithm itself."""
+    return (p.own, memory.own) if isinstance(p, Watched) else (p, memory)
+
+
 def verdicts_of(memory: Any) -> np.ndarray:
     """Rows of `css_common.health.VERDICT` of a memory of `initial_memory`."""
     if not isinstance(memory, WatchedMemory):
@@ -151,8 +158,18 @@ def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWa
         glimpse,
         p.aiding.gyro.largest_misfit,
     )
+    # cells that no Sun explains, whatever the gyro says, are no evidence against it
+    suspected = led.strikes > 0 or led.misfit > p.aiding.gyro.largest_misfit
+    if suspected and glimpse.known and not explains(p.cells, memory.cells, state.cells.track, glimpse):
+        led = waiting(led)
     health, trusted = check_aiding(p.aiding, before.health, memory.aiding, dt, aiding, glimpse, contradicts(led))
     return AidingWatch(sight, led, health), trusted
+
+
+@kernel
+def explains(p: CellHealthParameters, memory: CellHealthMemory, track: Track, glimpse: Glimpse) -> bool:
+    """Whether the cells that the common direction rests on are explained by the one without gyro."""
+    return cost(p, memory.used, glimpse.sun_b, glimpse.covariance, track.light) < UNEXPLAINED
 
 
 @kernel

@@ -6,6 +6,7 @@ from typing import ClassVar
 from css_common.codec import Sample
 from css_common.component import Outgoing, Received
 from css_common.run import node_main
+from css_estimation.health import watched
 from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_estimation.sun_filter import sun_filter
@@ -36,7 +37,8 @@ class SunFilter(SunEstimator):
 
     def calibration(self) -> list[Calibrated]:
         """What the flight has told of the cells so far; empty where they are not calibrated in flight."""
-        return calibration_report(self._parameters, self._memory)
+        p, memory = watched.own_of(self._parameters, self._memory)
+        return calibration_report(p, memory)
 
 
 main = node_main(SunFilter)

@@ -253,5 +253,7 @@ def finish_with_rate(
         rate_source,
         eclipse,
         estimate.mode,
+        isolated=0,
+        sensors_left=0,
     )
     return new_state, heading

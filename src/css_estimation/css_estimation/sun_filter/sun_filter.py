@@ -513,5 +513,7 @@ def step(
         rate_source,
         eclipse,
         mode,
+        isolated=0,
+        sensors_left=0,
     )
     return SunFilterState(progress, rate, found, validity, age, eclipse_state), heading
