@@ -158,7 +158,8 @@ def looked(
     calm = track.calm
     if not unexplained and seen.support >= 2 and rate_sure:
         calm += window
-    elif seen.against >= max(seen.support, 1) or not rate_sure:
+    elif seen.support < 2 or seen.against >= seen.support or not rate_sure:
+        # along the ring that one cell leaves the direction slides
         calm -= window
     calm = min(max(calm, 0.0), _CALM)
     sun_b, covariance, light = track.sun_b, track.covariance, track.light
