@@ -101,7 +101,7 @@ def note_outputs(
             if v != cell.last:
                 cell.same = 0.0
             elif v > _DARK and not (v == top and v > _FULL):
-                cell.same += _surprise(memory, voltages, i, least_change)
+                cell.same += _surprise(memory, voltages, i, _STEPS * least_change + turn * turn)
             cell.sum += v
             cell.readings += 1
             if memory.verdicts[i].held == 1 or cell.first_step >= 0:
@@ -113,8 +113,12 @@ def note_outputs(
 
 
 @kernel
-def _surprise(memory: CellHealthMemory, voltages, i: int, least_change: float) -> float:
-    """-ln of the chance that a healthy cell reads the same again, while so many others that are lit change."""
+def _surprise(memory: CellHealthMemory, voltages, i: int, quiet: float) -> float:
+    """-ln of the chance that a healthy cell reads the same again, while so many others that are lit change.
+
+    Args:
+        quiet: second differences that a turning body and the steps of a converter make.
+    """
     lit = changed = 0
     for j in range(voltages.shape[0]):
         other = memory.cells[j]
@@ -122,6 +126,6 @@ def _surprise(memory: CellHealthMemory, voltages, i: int, least_change: float) -
             continue
         lit += 1
         ripple = other.ripple * min(1.0, voltages[i] / voltages[j])
-        if voltages[j] != other.last and ripple > _STEPS * least_change:
+        if voltages[j] != other.last and ripple > quiet:
             changed += 1
     return -math.log(1.0 - 0.5 * changed / lit) if lit > 0 else 0.0
