@@ -62,7 +62,8 @@ def test_a_flight_is_the_same_in_processes(flown, tmp_path):
     assert result.failure == ""
     expected, found = messages_by_topic(flown), messages_by_topic(tmp_path / "bag")
     for topic in mission_with(ALL).topics:
-        assert found[f"/{topic}"] == expected[f"/{topic}"], topic
+        # a topic of events has nothing on it where nothing happens
+        assert found.get(f"/{topic}") == expected.get(f"/{topic}"), topic
 
 
 def test_the_estimator_gives_the_bytes_that_flew(flown, tmp_path):

@@ -73,7 +73,7 @@ def _drive(p, state, memory, dt, gyro, gyro_valid, field, field_valid, sun, vari
         )
         j = max(k - 1, 0)
         glimpse = glimpse_of(Sight((sun[j, 0], sun[j, 1], sun[j, 2]), variance, known[j]))
-        state, trusted = check_aiding(p, state, memory, dt, aiding, glimpse, misfits)
+        state, trusted = check_aiding(p, state, memory, dt, aiding, glimpse, misfits, True)
         bias = state.gyro.opinion.bias
         for i in range(3):
             out[k, i], out[k, 3 + i] = trusted.gyro_b[i], bias.bias_b[i]

@@ -100,6 +100,7 @@ def check_aiding(
     aiding: Aiding,
     sight: Glimpse,
     misfits: bool,
+    gyro_used: bool,
 ) -> tuple[AidingHealthState, Trusted]:
     """State, and what can be trusted.
 
@@ -108,6 +109,7 @@ def check_aiding(
         aiding: as measured.
         sight: the Sun by the cells alone, of the last cycle.
         misfits: the cells contradict a Sun line that the gyro leads.
+        gyro_used: somebody listens to it; else its silence is none.
     """
     step = state.step + 1
     gyro, gyro_b, gyro_valid, gyro_left = check_gyro(
@@ -116,7 +118,7 @@ def check_aiding(
         memory.axes,
         memory.fits,
         memory.gyro_verdicts,
-        dt,
+        dt if gyro_used else 0.0,
         step,
         aiding.gyro_b,
         aiding.gyro_valid,

@@ -162,7 +162,9 @@ def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWa
     suspected = led.strikes > 0 or led.misfit > p.aiding.gyro.largest_misfit
     if suspected and glimpse.known and not explains(p.cells, memory.cells, state.cells.track, glimpse):
         led = waiting(led)
-    health, trusted = check_aiding(p.aiding, before.health, memory.aiding, dt, aiding, glimpse, contradicts(led))
+    health, trusted = check_aiding(
+        p.aiding, before.health, memory.aiding, dt, aiding, glimpse, contradicts(led), p.use_gyro
+    )
     return AidingWatch(sight, led, health), trusted
 
 
