@@ -88,7 +88,7 @@ def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sou
     own, others = sources.seen_by(ROOT / "src/css_sim/css_sim/gyro.py", 3)
     names = [test.name for test in own]
     assert {"test_gyro_and_magnetometer_statistics.py", "test_draws_are_independent.py"} <= set(names[:3])
-    assert "test_simulation_components.py" in names[:6] and "test_slit_crossings.py" not in names
+    assert "test_simulation_components.py" in names[:4] and "test_rigid_body_against_closed_forms.py" not in names
     assert len(others) == 3 and not any("css_sim" in test.parts for test in others)
     # a node file is imported by what loads missions
     _, others = sources.seen_by(ROOT / "src/css_estimation/css_estimation/nodes/coning.py", 50)
