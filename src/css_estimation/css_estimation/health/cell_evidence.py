@@ -20,7 +20,7 @@ from css_common.health import (
     rename,
 )
 from css_common.kernel import kernel
-from css_estimation.health.cell_expectation import DOUBTFUL, SEEN, SURE, Expected, contradiction, expected
+from css_estimation.health.cell_expectation import DOUBTFUL, MOST_SQUARED, SEEN, SURE, Expected, contradiction, expected
 from css_estimation.health.cell_kinds import forget_sums, is_swapped, kind_of
 from css_estimation.health.cell_memory import (
     LEAPING,
@@ -106,6 +106,21 @@ def forget_scores(memory: CellHealthMemory) -> None:
 
 
 @kernel
+def _add_score(
+    p: CellHealthParameters, memory: CellHealthMemory, i: int, squared: float, window: float, step: int
+) -> bool:
+    """Adds squared sigmas that a cell was off for `window` [s] to its score; whether that is beyond the threshold."""
+    cell = memory.cells[i]
+    cell.score = min(max(0.0, cell.score + (squared - _FREE) * window), _MOST_SCORE)
+    if cell.score == 0.0:
+        cell.first_step = -1
+    elif cell.first_step < 0:
+        cell.first_step = step
+        _begin_sums(memory, i)
+    return cell.score > p.threshold
+
+
+@kernel
 def score_cells(
     p: CellHealthParameters,
     memory: CellHealthMemory,
@@ -136,14 +151,7 @@ def score_cells(
         if memory.verdicts[i].held == 1:
             _judge_on(p, memory, i, output, e, abs(c), window)
             continue
-        cell.score = min(max(0.0, cell.score + (abs(c) - _FREE) * window), _MOST_SCORE)
-        if cell.score == 0.0:
-            cell.first_step = -1
-            continue
-        if cell.first_step < 0:
-            cell.first_step = step
-            _begin_sums(memory, i)
-        if cell.score > p.threshold:
+        if _add_score(p, memory, i, abs(c), window, step):
             beyond += 1
     return beyond
 
@@ -223,13 +231,6 @@ def judge_in_the_dark(p: CellHealthParameters, memory: CellHealthMemory, window:
         if memory.verdicts[i].held == 1 or math.isnan(output):
             continue
         cell.predicted = 0.0
-        squared = min(output * output / (p.floor + p.noise * p.noise), 25.0)
-        cell.score = min(max(0.0, cell.score + (squared - _FREE) * window), _MOST_SCORE)
-        if cell.score == 0.0:
-            cell.first_step = -1
-            continue
-        if cell.first_step < 0:
-            cell.first_step = step
-            _begin_sums(memory, i)
-        if cell.score > p.threshold:
+        squared = min(output * output / (p.floor + p.noise * p.noise), MOST_SQUARED)
+        if _add_score(p, memory, i, squared, window, step):
             _leave_out(p, memory, i, EVIDENCE_DARK, cell.score, p.threshold, cell.first_step)

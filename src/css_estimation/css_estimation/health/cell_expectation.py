@@ -14,7 +14,7 @@ from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.cell_layout import cosine_on
 from css_estimation.symmetric import Symmetric, product
 
-_MOST = 25.0
+MOST_SQUARED = 25.0
 """Bound on the squared sigmas of a single cell, so that no single look decides."""
 
 # Variance of the Earth's light where it is a guess, by the square of its bound: that is 2.5 sigma.
@@ -90,7 +90,7 @@ def misfit(p: CellHealthParameters, e: Expected, output: float) -> float:
         variance += p.earth * p.earth * _EARTH_SHARE
     elif output < e.low:
         off = output - e.low
-    return min(off * off / variance, _MOST)
+    return min(off * off / variance, MOST_SQUARED)
 
 
 @kernel
@@ -105,5 +105,5 @@ def contradiction(p: CellHealthParameters, e: Expected, output: float, share: fl
         off = output - e.high - p.earth
     elif output < share * e.low:
         off = output - share * e.low
-    squared = min(off * off / e.variance, _MOST)
+    squared = min(off * off / e.variance, MOST_SQUARED)
     return squared if off > 0.0 else -squared

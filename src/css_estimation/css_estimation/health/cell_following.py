@@ -203,7 +203,7 @@ def _weighed(p: CellHealthParameters, memory: CellHealthMemory, track: Track, ra
     """Likelihood of the best hypothesis after a look of the search, and its direction to the Sun."""
     kept = _KEPT if rate_sure else _KEPT_WITHOUT_RATE
     weigh(p, memory, memory.judged, track.frame, track.light, kept)
-    best, _, g = judge_hypotheses(memory)
+    best, g = judge_hypotheses(memory)
     return best, multiply(track.frame, direction(g, DIRECTIONS))
 
 

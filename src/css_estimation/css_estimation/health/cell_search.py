@@ -117,17 +117,17 @@ def weigh(p: CellHealthParameters, memory: CellHealthMemory, outputs, frame: Mat
 
 
 @kernel
-def judge_hypotheses(memory: CellHealthMemory) -> tuple[float, int, int]:
-    """Likelihood, hypothesis and direction of the best; writes the evidence against each cell to `memory.against`."""
+def judge_hypotheses(memory: CellHealthMemory) -> tuple[float, int]:
+    """Likelihood and direction of the best hypothesis; writes the evidence against each cell to `memory.against`."""
     count = memory.against.shape[0]
-    best, best_h, best_g = -math.inf, 0, 0
+    best, best_g = -math.inf, 0
     for i in range(count):
         memory.against[i] = memory.healthy[i] = -math.inf
     h = 0
     for i in range(-1, count):
         top, g = _largest(memory.grid, h)
         if top > best:
-            best, best_h, best_g = top, h, g
+            best, best_g = top, g
         _credit(memory, top, i, -1)
         h += 1
     if count <= MOST_IN_PAIRS:
@@ -135,12 +135,12 @@ def judge_hypotheses(memory: CellHealthMemory) -> tuple[float, int, int]:
             for j in range(i):
                 top, g = _largest(memory.grid, h)
                 if top > best:
-                    best, best_h, best_g = top, h, g
+                    best, best_g = top, g
                 _credit(memory, top, i, j)
                 h += 1
     for i in range(count):
         memory.against[i] -= memory.healthy[i]
-    return best, best_h, best_g
+    return best, best_g
 
 
 @kernel
