@@ -157,7 +157,9 @@ def _windows(
     return np.concatenate(chosen), np.concatenate(knots), np.array(times), np.array(runs)
 
 
-def _at_time(time: np.ndarray, integral: np.ndarray, rows: np.ndarray, instant: float, window: np.ndarray) -> np.ndarray:
+def _at_time(
+    time: np.ndarray, integral: np.ndarray, rows: np.ndarray, instant: float, window: np.ndarray
+) -> np.ndarray:
     """The integral at the time of a knot."""
     near = rows if not len(window) else window
     return integral[near[np.argmin(np.abs(time[near] - instant))]]

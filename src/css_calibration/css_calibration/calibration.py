@@ -22,6 +22,8 @@ from css_estimation.sun_filter.options import Response
 ATTITUDE, SUN, BATCH = "attitude", "sun", "batch"
 """References: the true attitude, the true Sun in the body alone, or attitude from rates, field and place."""
 CURVES = {"cosine": 0, "okeefe": 1}
+UNTOLD = 0.95
+"""A parameter of whose ignorance more than this is left is left alone; from a half on it is told with others alone."""
 _MOST = {ATTITUDE: 2500, SUN: 2500, BATCH: 1000}  # instants: more tell no more than clouds let them
 _ROUNDS = 2  # of fits, each with the Earth's light on the normals and attitudes of the one before
 _VARIES = 1.0  # [K] of temperature, standard deviation, below which it tells nothing
@@ -42,7 +44,7 @@ class Calibration:
         reference_temperature: of the gains [deg C].
         data: outputs and light.
         fit: of the cells, and of the track where there is one.
-        observed: (N, 5) parameters that the recording has told.
+        left: (N, 5) what is left of the ignorance of each parameter, 0 to 1.
         track: of a batch.
         bias, field: of gyro and magnetometer with a truth.
         holdout: (M,) instants that the numbers below come from; the fit behind these did not have their outputs.
@@ -56,7 +58,7 @@ class Calibration:
     reference_temperature: float
     data: CellData
     fit: Fit
-    observed: np.ndarray
+    left: np.ndarray
     track: Track | None
     bias: Linear | None
     field: Linear | None
@@ -66,9 +68,14 @@ class Calibration:
     notes: list[str] = field(default_factory=list)
 
     @property
+    def observed(self) -> np.ndarray:
+        """(N, 5) parameters that the recording has told."""
+        return is_observed(self.left)
+
+    @property
     def parameters(self) -> np.ndarray:
-        """(N, 5) of the cells; what was not observed is as the mission has it."""
-        return np.where(self.observed, self.fit.parameters, nominal_parameters(len(self.observed)))
+        """(N, 5) of the cells; what the recording says nothing of is as the mission has it."""
+        return np.where(self.left < UNTOLD, self.fit.parameters, nominal_parameters(len(self.left)))
 
     @property
     def sigma(self) -> np.ndarray:
@@ -97,7 +104,9 @@ def reference_of(recorded: Recorded, asked: str = "auto") -> str:
     has_batch = len(recorded.gyro_ns) > 0 and recorded.field_b is not None and recorded.r_n is not None
     has_truth = recorded.sun_b is not None
     if asked == "truth" and not has_truth:
-        raise CalibrationError(f"{recorded.origin}: no true Sun, expected the Sun in the body (css_msgs/SpacecraftState)")
+        raise CalibrationError(
+            f"{recorded.origin}: no true Sun, expected the Sun in the body (css_msgs/SpacecraftState)"
+        )
     if asked != "batch" and has_truth:
         return ATTITUDE if recorded.dcm_bn is not None else SUN
     if has_batch:
@@ -118,7 +127,12 @@ def reference_of(recorded: Recorded, asked: str = "auto") -> str:
 
 
 def calibrate(
-    recorded: Recorded, *, reference: str = "auto", curve: str = "auto", holdout: float = 0.25, tell: Tell = lambda _: None
+    recorded: Recorded,
+    *,
+    reference: str = "auto",
+    curve: str = "auto",
+    holdout: float = 0.25,
+    tell: Tell = lambda _: None,
 ) -> Calibration:
     """Calibrates cells, and with them what aids them.
 
@@ -148,7 +162,7 @@ def calibrate(
     chosen, data, result = _best_curve(frame, curve, tell, notes)
     held = _held_out(thin, holdout)
     before, after = _worth(frame, chosen, data, result, held, tell)
-    observed = _observed(result)
+    left = _left(result)
     bias = gyro_bias(recorded) if kind != BATCH else None
     of_field = magnetometer(thin, around) if kind == ATTITUDE else None
     if kind == SUN and recorded.field_b is not None:
@@ -156,7 +170,7 @@ def calibrate(
     if kind == SUN:
         notes.append("the light of the Earth is not predicted, for the place is not known: it is in the error bars")
     return Calibration(
-        thin, kind, chosen, warmth, data, result, observed, track, bias, of_field, held, before, after, notes
+        thin, kind, chosen, warmth, data, result, left, track, bias, of_field, held, before, after, notes
     )
 
 
@@ -180,7 +194,9 @@ class _Frame:
         assert sun_b is not None
         return cell_data(self.recorded, self.around, sun_b, dcm_bn, response, self.warmth, parameters)
 
-    def fitted(self, response: Response, usable: np.ndarray | None = None, start: Fit | None = None) -> tuple[CellData, Fit]:
+    def fitted(
+        self, response: Response, usable: np.ndarray | None = None, start: Fit | None = None
+    ) -> tuple[CellData, Fit]:
         """Rounds of fits."""
         before = start
         for _ in range(_ROUNDS):
@@ -258,16 +274,16 @@ def _worth(
     _, trained = frame.fitted(response_of(CURVES[curve]), ~held[:, None], result)
     rest = data.some(held)
     nominal = nominal_parameters(data.voltages.shape[1])
-    after = heading_errors(rest, np.where(_observed(trained), trained.parameters, nominal), trained.earth)
+    after = heading_errors(rest, np.where(_left(trained) < UNTOLD, trained.parameters, nominal), trained.earth)
     before = heading_errors(rest, nominal, 1.0)
     both = np.isfinite(before) & np.isfinite(after)
     return before[both], after[both]
 
 
-def _observed(result: Fit) -> np.ndarray:
-    """(N, 5) what counts as told."""
+def _left(result: Fit) -> np.ndarray:
+    """(N, 5) what is left of the ignorance of each parameter; 1 where nothing was looked for."""
     unknowns = result.unknowns
-    observed = np.zeros(unknowns.free.shape, np.bool_)
+    left = np.ones(unknowns.free.shape)
     cells = int(unknowns.free.sum())
-    observed[unknowns.free] = is_observed(np.sqrt(np.diag(result.covariance))[:cells])
-    return observed
+    left[unknowns.free] = np.sqrt(np.diag(result.covariance))[:cells]
+    return left

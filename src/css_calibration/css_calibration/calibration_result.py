@@ -54,7 +54,9 @@ def rows_of(c: Calibration) -> list[Row]:
     if c.fit.unknowns.earth:
         place = c.fit.unknowns.count - 1
         left = math.sqrt(c.fit.covariance[place, place])
-        rows.append(Row("earth", None, c.fit.earth, left * c.fit.unknowns.ignorance.earth, "-", bool(is_observed(left))))
+        rows.append(
+            Row("earth", None, c.fit.earth, left * c.fit.unknowns.ignorance.earth, "-", bool(is_observed(left)))
+        )
     return rows + list(_aid_rows(c))
 
 
@@ -68,9 +70,7 @@ def _aid_rows(c: Calibration) -> Iterator[Row]:
     if c.field is not None:
         values[3:], sigmas[3:] = c.field.x, c.field.sigma
     for name, place, axes, unit, factor in _AIDS:
-        for axis, value, sigma, before in zip(
-            axes, values[place], sigmas[place], COMMON_SIGMA[place], strict=True
-        ):
+        for axis, value, sigma, before in zip(axes, values[place], sigmas[place], COMMON_SIGMA[place], strict=True):
             if math.isfinite(sigma):
                 told = bool(is_observed(sigma / before))
                 yield Row(f"{name}_{axis}", None, factor * value if told else 0.0, factor * sigma, unit, told)
@@ -80,7 +80,7 @@ def unobserved_combinations(c: Calibration) -> list[str]:
     """What the cells' outputs did not tell, each as the parameters that make it."""
     count = c.fit.unknowns.count
     names = [
-        f"cell {i}: {name}" for i in range(len(c.observed)) for name, k, _, _ in _CELL_ROWS if c.fit.unknowns.free[i, k]
+        f"cell {i}: {name}" for i in range(len(c.left)) for name, k, _, _ in _CELL_ROWS if c.fit.unknowns.free[i, k]
     ]
     names += ["earth"] * c.fit.unknowns.earth
     found = []
@@ -165,7 +165,11 @@ def calibration_file(c: Calibration, source: str, extends: str | None) -> str:
         if "cells.measured.temperature" in shared
         else f"Reference: {c.reference}; response of the cells: {c.curve}.",
         "What the recording did not tell is as the mission has it:",
-        *(f"  {row.name}{'' if row.cell is None else f' of cell {row.cell}'}" for row in rows_of(c) if not row.observable),
+        *(
+            f"  {row.name}{'' if row.cell is None else f' of cell {row.cell}'}"
+            for row in rows_of(c)
+            if not row.observable
+        ),
     ]
     if all(row.observable for row in rows_of(c)):
         head[-1:] = []

@@ -47,7 +47,9 @@ def surroundings_of(recorded: Recorded, *, with_field: bool) -> Surroundings:
     """Models at the instants of a recording; without a place the Sun is whole and at 1 AU."""
     count = len(recorded.stamp_ns)
     unknown = np.full((count, 3), np.nan)
-    result = Surroundings(unknown, np.ones(count), np.ones(count), np.zeros(count), unknown.copy(), np.tile(np.eye(3), (count, 1, 1)))
+    result = Surroundings(
+        unknown, np.ones(count), np.ones(count), np.zeros(count), unknown.copy(), np.tile(np.eye(3), (count, 1, 1))
+    )
     if recorded.r_n is None:
         return result
     epoch_ns = int(recorded.stamp_ns[0])

@@ -45,10 +45,20 @@ MEASURED_NORMALS = reals(
     columns=3,
 )
 MEASURED_SCALES = reals(
-    "cells.measured.scales", (), "-", "output of each cell at full light, as calibrated; empty: all 1", low=0.01, high=100.0
+    "cells.measured.scales",
+    (),
+    "-",
+    "output of each cell at full light, as calibrated; empty: all 1",
+    low=0.01,
+    high=100.0,
 )
 MEASURED_DARKS = reals(
-    "cells.measured.darks", (), "-", "output of each cell in the dark, as calibrated; empty: all 0", low=-10.0, high=10.0
+    "cells.measured.darks",
+    (),
+    "-",
+    "output of each cell in the dark, as calibrated; empty: all 0",
+    low=-10.0,
+    high=10.0,
 )
 MEASURED_COEFFICIENTS = reals(
     "cells.measured.temperature_coefficients",

@@ -123,7 +123,7 @@ def _print(result: Calibration, console: Console) -> None:
 def _cell_table(result: Calibration, rows: list[Row]) -> ReadableTable:
     recorded = result.recorded
     table = ReadableTable(
-        f"{recorded.mission.name}: {len(result.observed)} cells, {len(recorded.stamp_ns)} instants, reference: "
+        f"{recorded.mission.name}: {len(result.left)} cells, {len(recorded.stamp_ns)} instants, reference: "
         f"{result.reference}, response: {result.curve}"
     )
     names = [name for name in _CELL_HEADINGS if any(row.name == name for row in rows)]
@@ -132,7 +132,7 @@ def _cell_table(result: Calibration, rows: list[Row]) -> ReadableTable:
         table.add_number(_CELL_HEADINGS[name])
         table.add_number("1 sigma")
     by_place = {(row.cell, row.name): row for row in rows}
-    for cell in range(len(result.observed)):
+    for cell in range(len(result.left)):
         texts = [f"{cell}"]
         for name in names:
             row, factor = by_place[cell, name], _PERCENT.get(name, 1.0)
@@ -150,7 +150,7 @@ def _residual_table(result: Calibration) -> ReadableTable:
     for low, high in bins:
         table.add_number(f"{low:.0f} to\n{high:.0f} deg")
     by_place = {(row["cell"], row["from_deg"]): row for row in rows}
-    for cell in range(len(result.observed)):
+    for cell in range(len(result.left)):
         found = [by_place.get((cell, low)) for low, _ in bins]
         table.add_texts(
             [f"{cell}", *("-" if row is None else f"{1e3 * row['mean']:.1f} / {1e3 * row['rms']:.1f}" for row in found)]

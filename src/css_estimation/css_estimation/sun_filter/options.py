@@ -18,7 +18,14 @@ from css_estimation.sun.flight_sky import USE_FIELD
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
 from css_estimation.sun_filter import calibration_options
 from css_estimation.sun_filter.calibration_options import Calibration, lasting_error
-from css_sensors.cells import MEASURED_DARKS, MEASURED_NORMALS, MEASURED_SCALES, half_view_cosine, known_normals, plane_sides
+from css_sensors.cells import (
+    MEASURED_DARKS,
+    MEASURED_NORMALS,
+    MEASURED_SCALES,
+    half_view_cosine,
+    known_normals,
+    plane_sides,
+)
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
 """One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
