@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Cells with scale errors of 5 to 20 % and tilts of 3 deg, calibrated by simulated flights: how often the true values lie
-within the stated error, and how headings err before, after, and with cells that are known exactly.
+"""Cells with scale errors of 5 to 20 % and tilts of 3 deg, calibrated by simulated flights.
 
-The scale error of a case is normal with 5, 10, 15 or 20 %, in turn. The first two thirds of a flight calibrate, the last
-third is what the headings are measured on. The last line is a JSON object; the exit code is 1 when fewer than 99 % of the
-parameters lie within three of their standard deviations, or when the mean heading error after calibration is more than 10 %
-above that with known cells.
+How often the true values lie within the stated error, and how headings err before, after, and with cells that are known
+exactly. The scale error of a case is normal with 5, 10, 15 or 20 %, in turn. The first two thirds of a flight
+calibrate, headings are measured on the last third. The last line is a JSON object; the exit code is 1 when fewer than 99 % of the
+parameters lie within three of their standard deviations, or when the mean heading error of `ekf` after calibration is
+more than 10 % above that with known cells.
 
     python benchmarks/calibration_recovery.py --cases 200 --reference truth
 """
@@ -24,7 +24,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from uncalibrated import (  # noqa: E402
+from uncalibrated import (
     Flown,
     flown,
     heading_errors,
@@ -36,10 +36,10 @@ from uncalibrated import (  # noqa: E402
     without_truth,
 )
 
-from css_calibration.calibration import Calibration, calibrate  # noqa: E402
-from css_calibration.cell_fit_model import normals_of  # noqa: E402
-from css_calibration.errors import CalibrationError  # noqa: E402
-from css_calibration.recorded import Recorded  # noqa: E402
+from css_calibration.calibration import Calibration, calibrate
+from css_calibration.cell_fit_model import normals_of
+from css_calibration.errors import CalibrationError
+from css_calibration.recorded import Recorded
 
 _SCALES = (0.05, 0.10, 0.15, 0.20)
 _PART = 2.0 / 3.0
@@ -106,8 +106,11 @@ def main() -> int:
         errors.append([headings(flight, c, name) for name in _ESTIMATORS])
         worst = np.nanmax(np.abs(of_cells)) if np.isfinite(of_cells).any() else float("nan")
         shown = "; ".join(" ".join(f"{e:.3f}" for e in row) for row in errors[-1])
-        print(f"case {case}: observed {np.isfinite(of_cells).mean():.2f}, worst {worst:.2f} sigma, heading {shown} deg, "
-              f"{time.monotonic() - began:.0f} s", flush=True)  # fmt: skip
+        told, wall_s = np.isfinite(of_cells).mean(), time.monotonic() - began
+        print(
+            f"case {case}: observed {told:.2f}, worst {worst:.2f} sigma, heading {shown} deg, {wall_s:.0f} s",
+            flush=True,
+        )
     return _verdict(options.reference, np.array(cells), np.array(aids), np.array(errors), refused)
 
 

@@ -11,6 +11,7 @@ from css_common.codec import codec_of
 from css_common.component import Cycles
 from css_common.message_columns import Columns, columns_of
 from css_common.mission import Mission, mission_from_text
+from css_common.mission_file import dump_sections
 from css_common.random_streams import random_key
 from css_common.vectors import axes_across
 from css_monte_carlo.direct_flight import fly_and_keep
@@ -24,7 +25,8 @@ MISSION = """
     mission: {name: uncalibrated, duration: 3000.0, period: 1.0}
     wheels: {fitted: false}
     graph:
-      nodes: [css_sim/dynamics, css_sim/css_array, css_sim/gyro, css_sim/magnetometer, css_estimation/ekf, css_estimation/sun_filter]
+      nodes: [css_sim/dynamics, css_sim/css_array, css_sim/gyro, css_sim/magnetometer,
+              css_estimation/ekf, css_estimation/sun_filter]
     criteria: {heading_error_mean_deg: {max: 90.0}, power_positive_s: {max: 1.0e+9}}
 css_array:
   ros__parameters: {misalignment_deg: 3.0, scale_cell_error: 0.1, bias: 0.01, output_low: -1.0}
@@ -37,7 +39,7 @@ sun_filter:
 ekf:
   ros__parameters: {health: {enabled: false}}
 """
-"""Eight cells in a tumble of up to 2 deg/s about each axis, no control, clouds that nobody knows, half an orbit of Sun."""
+"""Eight cells in a tumble of up to 2 deg/s about each axis, no control, clouds unknown, half an orbit of Sun."""
 
 TOPICS = ("truth", "css/voltages", "gyro/imu", "mag/field")
 
@@ -77,9 +79,9 @@ def sun_alone(flight: Flown) -> Recorded:
     assert sun_b is not None
     zeros = np.zeros((len(truth), 3))
     fields = vars(truth) | {"sun_n": sun_b, "sigma_bn": zeros, "r_n": zeros}
-    mission = mission_from_text(
-        flight.mission.text().replace("source: elements", "source: none"), "telemetry", ["graph.nodes="]
-    )
+    given = flight.mission.parameters["/**"]
+    known = {key: value for key, value in given.items() if key.split(".")[0] in ("mission", "cells")}
+    mission = mission_from_text(dump_sections({"/**": known}), "telemetry")
     kinds = flight.mission.topics
     by_type = {kinds[t]: c for t, c in flight.columns.items() if t not in ("truth", "mag/field")}
     return recorded_of("telemetry", mission, by_type | {SpacecraftState: Columns(**fields)}, [])

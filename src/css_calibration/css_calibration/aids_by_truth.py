@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Errors of gyro and magnetometer where the truth is recorded: linear least squares, robust, with what was known before."""
+"""Errors of gyro and magnetometer where the truth is recorded: linear least squares, robust, with priors."""
 
 from typing import NamedTuple
 

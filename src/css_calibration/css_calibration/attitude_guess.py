@@ -2,8 +2,8 @@
 """First guess of the attitude along a recording without truth: rates integrated, and turns about the field tried out.
 
 Over a window of a minute rate and field leave one angle open, the turn about the field. For each of many such turns the
-cells tell how well they fit. The sequence of turns that fits cells best while windows follow on one another, as the gyro
-says that they must, is found by dynamic programming (Viterbi).
+cells tell how well they fit. The sequence of turns that fits cells best while windows follow on one another, as
+the gyro says that they must, is found by dynamic programming (Viterbi).
 """
 
 import numpy as np

@@ -124,10 +124,11 @@ class Track:
         by_angle = np.einsum("ki,kij,kjl->kl", weights, self.phi, crossing(turned))
         out = np.zeros((len(e), self.count))
         out[:, BIAS] = -np.einsum("ki,kij->kj", by_angle, self._between()) * COMMON_SIGMA[BIAS]
+        after = np.minimum(self.knot + 1, len(self.start) - 1)
+        share = self.share * self.linked[self.knot]
         for j in range(3):
-            np.add.at(out, (rows, COMMON + 3 * self.knot + j), (1.0 - self.share) * by_angle[:, j] * _KNOT_SIGMA)
-            after = np.minimum(self.knot + 1, len(self.start) - 1)
-            np.add.at(out, (rows, COMMON + 3 * after + j), self.share * by_angle[:, j] * _KNOT_SIGMA)
+            np.add.at(out, (rows, COMMON + 3 * self.knot + j), (1.0 - share) * by_angle[:, j] * _KNOT_SIGMA)
+            np.add.at(out, (rows, COMMON + 3 * after + j), share * by_angle[:, j] * _KNOT_SIGMA)
         return out
 
     def links(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

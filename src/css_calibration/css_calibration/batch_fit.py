@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Batch least squares over a whole recording: cells, and with them attitude, gyro and magnetometer if no truth is there.
+"""Batch least squares over a whole recording: cells; without a truth attitude, gyro and magnetometer as well.
 
 Three passes of `scipy.optimize.least_squares`, all derivatives in closed form. The first has a soft-L1 loss, so that
 outliers do not lead it astray; then the noise is read off the residuals, what is beyond 5 sigma is left out and named,
@@ -70,7 +70,9 @@ class Fit:
 class _Problem:
     """Residuals and derivatives for given weights."""
 
-    def __init__(self, data: CellData, unknowns: Unknowns, track: Track | None, counts: np.ndarray, noise: Noise):
+    def __init__(
+        self, data: CellData, unknowns: Unknowns, track: Track | None, counts: np.ndarray, noise: Noise
+    ) -> None:
         self.data, self.unknowns, self.track = data, unknowns, track
         self.rows, self.cells = np.nonzero(counts)
         self.noise = noise
@@ -153,7 +155,8 @@ def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: n
         problem.weigh(x)
         result = least_squares(
             problem.residuals, x, jac=problem.jacobian, loss="soft_l1" if number == 0 else "linear",
-            f_scale=_SOFT, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=1e-9, x_scale="jac" if track is None else 1.0, max_nfev=40,
+            f_scale=_SOFT, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=1e-9, max_nfev=40,
+            x_scale="jac" if track is None else 1.0,
         )  # fmt: skip
         x = result.x
         off, expected, earthly, parameters = _off(problem, x, counts)

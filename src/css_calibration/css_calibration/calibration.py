@@ -140,7 +140,7 @@ def calibrate(
         recorded: whole recording.
         reference: auto (a truth if there is one), truth, or batch.
         curve: response of the cells, of `CURVES`; auto: the one that explains the outputs better.
-        holdout: share of the recording, at its end, whose outputs show what the calibration is worth.
+        holdout: share of the sunlight, at its end, whose outputs show what the calibration is worth.
         tell: takes a line about each step.
 
     Raises:
@@ -160,7 +160,7 @@ def calibrate(
     notes = [*recorded.notes, *warm_notes]
     frame = _Frame(thin, around, kind, track, warmth)
     chosen, data, result = _best_curve(frame, curve, tell, notes)
-    held = _held_out(thin, holdout)
+    held = _held_out(data, holdout)
     before, after = _worth(frame, chosen, data, result, held, tell)
     left = _left(result)
     bias = gyro_bias(recorded) if kind != BATCH else None
@@ -258,10 +258,12 @@ def _misfit(data: CellData, result: Fit) -> float:
     return float(np.median(np.abs(result.residuals[lit]))) if lit.any() else 0.0
 
 
-def _held_out(recorded: Recorded, share: float) -> np.ndarray:
-    """Instants at the end of the recording."""
-    time = recorded.time
-    return time > (1.0 - share) * time[-1] if share > 0.0 else np.zeros(len(time), np.bool_)
+def _held_out(data: CellData, share: float) -> np.ndarray:
+    """Instants at the end of the recording, with a share of those at which the Sun is on a cell."""
+    lit = (data.usable & data.seen).any(axis=1)
+    if share <= 0.0 or not lit.any():
+        return np.zeros(len(lit), np.bool_)
+    return data.time > np.quantile(data.time[lit], 1.0 - share)
 
 
 def _worth(

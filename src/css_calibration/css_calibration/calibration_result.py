@@ -3,6 +3,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,14 +107,13 @@ def residual_rows(c: Calibration) -> list[dict[str, Any]]:
     angle = np.degrees(np.arccos(np.clip(c.data.incidence_cosine(normals_b), -1.0, 1.0)))
     rows = []
     for i in range(angle.shape[1]):
-        for low, high in zip(_BINS_DEG[:-1], _BINS_DEG[1:], strict=True):
+        for low, high in pairwise(_BINS_DEG):
             inside = c.data.seen[:, i] & (angle[:, i] >= low) & (angle[:, i] < high) & ~c.fit.outliers[:, i]
             off = c.fit.residuals[inside & np.isfinite(c.fit.residuals[:, i]), i]
             if len(off):
                 rms = float(np.sqrt(np.mean(off**2)))
-                rows.append({
-                    "cell": i, "from_deg": low, "to_deg": high, "outputs": len(off), "mean": float(off.mean()), "rms": rms
-                })  # fmt: skip
+                row = {"cell": i, "from_deg": low, "to_deg": high, "outputs": len(off)}
+                rows.append(row | {"mean": float(off.mean()), "rms": rms})
     return rows
 
 

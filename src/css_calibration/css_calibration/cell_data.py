@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What of the outputs calibrates: those whose light is known, away from the edges of views, of a Sun that is whole or gone.
+"""What of the outputs calibrates: those whose light is known, away from edges of views, of a Sun whole or gone.
 
 Next to the edge of a view, or of the plane that hides half of the sky, a tilt of a few degrees decides whether a cell
-sees the Sun at all: no derivative tells that, so such outputs are left out. In the shadow of the Earth a cell shows what
-it reads in the dark, whatever its attitude.
+sees the Sun at all: no derivative tells that, so such outputs are left out. In the shadow of the Earth a cell shows
+what it reads in the dark, whatever its attitude.
 """
 
 import math

@@ -4,8 +4,8 @@
     V_ik = dark_i + gain_i (1 + kappa_i (T_k - T_0)) R(light_ik),
     light_ik = intensity_k max(0, n_i.s_k) seen_ik + earth albedo_ik,    n_i = unit(n0_i + a_i e1_i + b_i e2_i)
 
-with the response R of `sun_filter.response` and the tilts a and b of `cell_calibration`, so that what is found means the
-same there.
+with the response R of `sun_filter.response` and the tilts a and b of `cell_calibration`, so that what is found means
+the same there.
 """
 
 import math

@@ -7,7 +7,7 @@ import numpy as np
 
 from css_calibration.recorded import Recorded
 from css_common.kernel import kernel
-from css_common.vectors import row
+from css_common.vectors import Mat3, row
 from css_environment.albedo import Screen, albedo_output, new_workspace, plane_screen
 from css_environment.constants import ASTRONOMICAL_UNIT
 from css_environment.earth_light import EarthView, albedo_sources, new_earth_view, new_light
@@ -122,7 +122,7 @@ def _illuminations(r_n, sun_n, distance, out) -> None:
 
 
 @kernel
-def _mat3(m, k: int):
+def _mat3(m, k: int) -> Mat3:
     return (
         (m[k, 0, 0], m[k, 0, 1], m[k, 0, 2]),
         (m[k, 1, 0], m[k, 1, 1], m[k, 1, 2]),

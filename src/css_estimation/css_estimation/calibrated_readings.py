@@ -3,9 +3,9 @@
 
     cells: (v - dark) / scale,    gyro: omega - bias,    magnetometer: M^-1 (b - bias)
 
-Where nothing was calibrated the readings are handed on as they are, to the last bit. The normals that a calibration found
-are `css_sensors.cells.known_normals`. A temperature coefficient acts where a temperature is known: when telemetry is
-imported, not here.
+Where nothing was calibrated the readings are handed on as they are, to the last bit. The normals that a calibration
+found are `css_sensors.cells.known_normals`. A temperature coefficient acts where a temperature is known, which is not
+here.
 """
 
 import numpy as np

@@ -26,8 +26,8 @@ _EXITS = {
     2: "the recording has nothing to hold the cells against, or what is asked for is wrong",
 }
 _NOTES = """\
-The file is a ROS parameter file: replay takes it by --calibration, nodes by --params-file behind the mission's, and with
---extends MISSION it is a mission itself."""
+The file is a ROS parameter file: replay takes it by --calibration, nodes by --params-file behind the mission's, and
+with --extends MISSION it is a mission itself."""
 
 
 def _parser() -> CommandParser:
@@ -53,7 +53,7 @@ def _parser() -> CommandParser:
     )  # fmt: skip
     parser.add_argument(
         "--holdout", type=number("a share from 0 to 0.8", lambda value: 0.0 <= value <= 0.8), default=0.25,
-        metavar="SHARE", help="of the recording, at its end (default: %(default)s; 0: none)",
+        metavar="SHARE", help="of the sunlight, at its end (default: %(default)s; 0: none)",
     )  # fmt: skip
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser

@@ -3,8 +3,6 @@
 
 import argparse
 import json
-import sys
-import time
 from pathlib import Path
 
 from rich.console import Console
@@ -23,6 +21,7 @@ from css_calibration.calibration_result import (
 )
 from css_calibration.errors import CalibrationError
 from css_calibration.mission_of import recorded_by
+from css_calibration.step_lines import step_lines
 from css_common.command import FAILED, complain
 from css_common.mission import find_mission
 from css_common.progress_lines import still_working
@@ -35,7 +34,6 @@ _CELL_HEADINGS = {
     "temperature_coefficient": "by temperature\n[%/K]",
 }
 _PERCENT = {"temperature_coefficient": 100.0}
-_SHOWN_AFTER_S = 2.0
 
 
 def run(prog: str, options: argparse.Namespace) -> int:
@@ -49,7 +47,7 @@ def run(prog: str, options: argparse.Namespace) -> int:
     with still_working(f"calibrating by {options.bag}"):
         recorded = recorded_by(options)
         result = calibrate(
-            recorded, reference=options.reference, curve=options.response, holdout=options.holdout, tell=_teller()
+            recorded, reference=options.reference, curve=options.response, holdout=options.holdout, tell=step_lines()
         )
     text = calibration_file(result, str(options.bag), options.extends)
     file.write_text(text, encoding="utf-8")
@@ -65,17 +63,6 @@ def run(prog: str, options: argparse.Namespace) -> int:
 
 def _default_file(bag: Path) -> Path:
     return bag.with_name(f"{bag.stem if bag.is_file() else bag.name}_calibration.yaml")
-
-
-def _teller():  # noqa: ANN202
-    """Says each step once the whole has taken a while."""
-    began = time.monotonic()
-
-    def tell(line: str) -> None:
-        if time.monotonic() - began > _SHOWN_AFTER_S:
-            print(f"... {line}", file=sys.stderr, flush=True)
-
-    return tell
 
 
 def _shortcoming(result: Calibration) -> str:
@@ -103,8 +90,8 @@ def _print(result: Calibration, console: Console) -> None:
     console.print(_residual_table(result))
     for outlier in outlier_rows(result):
         console.print(
-            f"left out: {outlier['outputs']} of {outlier['of']} outputs of cell {outlier['cell']}, from {outlier['from']} "
-            f"to {outlier['to']}, up to {outlier['largest']:.3f} off",
+            f"left out: {outlier['outputs']} of {outlier['of']} outputs of cell {outlier['cell']}, from "
+            f"{outlier['from']} to {outlier['to']}, up to {outlier['largest']:.3f} off",
             soft_wrap=True,
         )
     for line in unobserved_combinations(result):
@@ -116,7 +103,7 @@ def _print(result: Calibration, console: Console) -> None:
         console.print("heading error: not measured, no instant that was held out has cells that tell a direction")
     else:
         console.print(
-            f"heading by cells alone, {len(result.before)} instants held out: {before:.3f} deg before, {after:.3f} deg after"
+            f"heading by cells alone, {len(result.before)} instants held out: {before:.3f} deg, {after:.3f} calibrated"
         )
 
 
