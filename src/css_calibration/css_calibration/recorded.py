@@ -36,6 +36,7 @@ _TAKEN = {
     type_name(Temperature): (Temperature, "/css/temperature"),
 }
 _FEWEST = 20  # instants
+_SURELY_LIT, _NOTHING, _MOST_DARK = 0.6, 0.1, 0.7
 
 
 @dataclass
@@ -55,6 +56,7 @@ class Recorded:
         sun_b: (M, 3) true direction to the Sun in b, NaN where unknown; None: not recorded.
         dcm_bn: (M, 3, 3) true attitude, of a truth that knows its place; None: unknown.
         r_n: (M, 3) position [m]; None: unknown.
+        sunlight: (M,) intensity of the Sun that a truth without a place tells; None: unknown.
         notes: what was left out or guessed, one line each.
     """
 
@@ -70,6 +72,7 @@ class Recorded:
     sun_b: np.ndarray | None = None
     dcm_bn: np.ndarray | None = None
     r_n: np.ndarray | None = None
+    sunlight: np.ndarray | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -101,6 +104,7 @@ class Recorded:
             some(self.sun_b),
             some(self.dcm_bn),
             some(self.r_n),
+            some(self.sunlight),
             self.notes,
         )
 
@@ -257,6 +261,8 @@ def _add_truth(recorded: Recorded, truth: Columns, half_ns: float) -> None:
     recorded.sun_b = sun_b
     placed = np.linalg.norm(truth.r_n[rows], axis=1) > 1e6
     if not placed[known].all():
+        recorded.sunlight = np.where(known, truth.illumination[rows] * truth.solar_flux[rows], 1.0)
+        _leave_dark_ones_out(recorded)
         return
     dcm_bn = np.empty((len(rows), 3, 3))
     _attitudes(sigma_bn, dcm_bn)
@@ -265,6 +271,21 @@ def _add_truth(recorded: Recorded, truth: Columns, half_ns: float) -> None:
     r_n = np.array(truth.r_n[rows], dtype=np.float64)
     r_n[~known] = np.nan
     recorded.r_n = r_n
+
+
+def _leave_dark_ones_out(recorded: Recorded) -> None:
+    """Of a truth that knows no shadow: instants at which no cell reads anything that the Sun should shine on."""
+    assert recorded.sun_b is not None and recorded.sunlight is not None
+    section = recorded.mission.values.cells
+    cosine = np.nan_to_num(recorded.sun_b) @ np.asarray(section.normals, dtype=np.float64).T
+    lit = (cosine > _SURELY_LIT) & np.isfinite(recorded.voltages) & (recorded.sunlight > 0.5)[:, None]
+    brightest = np.where(lit, recorded.voltages, -np.inf).max(axis=1)
+    dark = lit.any(axis=1) & (brightest < _NOTHING)
+    if dark.any() and dark.sum() < _MOST_DARK * len(dark):
+        recorded.sun_b[dark] = np.nan
+        recorded.notes.append(
+            f"{int(dark.sum())} instants left out: no cell that the Sun should shine on reads anything, as in a shadow"
+        )
 
 
 @kernel

@@ -19,6 +19,7 @@ from css_environment.sun import sun_positions
 from css_sensors.cells import half_view_cosine, plane_sides
 
 _DAY_S = 86_400.0
+_WHOLE = 0.95  # of sunlight that nothing hides, at the Earth's farthest from the Sun
 _CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side")], align=True)
 
 
@@ -51,6 +52,9 @@ def surroundings_of(recorded: Recorded, *, with_field: bool) -> Surroundings:
         unknown, np.ones(count), np.ones(count), np.zeros(count), unknown.copy(), np.tile(np.eye(3), (count, 1, 1))
     )
     if recorded.r_n is None:
+        if recorded.sunlight is not None:
+            result.intensity = recorded.sunlight.copy()
+            result.shadow = np.clip(1.0 - recorded.sunlight, 0.0, 1.0) * (recorded.sunlight < _WHOLE)
         return result
     epoch_ns = int(recorded.stamp_ns[0])
     elapsed = recorded.time
