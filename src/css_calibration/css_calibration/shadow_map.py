@@ -13,7 +13,7 @@ from css_estimation.sun.direction_grid import direction
 PATCHES = 300
 """Patches of the sphere: 12 deg from one to the next."""
 _LOSS = 0.25  # of the light
-_LEAST_IN_PATCH, _LEAST_SHADED = 2, 15
+_LEAST_IN_PATCH, _LEAST_SHADED = 2, 10
 _PURE = 0.8  # share of the lit outputs of a shaded patch that are shaded
 _VISITS = 2  # apart in time, with light from other directions between
 
