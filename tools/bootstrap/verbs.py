@@ -23,6 +23,7 @@ VERBS = {
     "demo": Verb("fly one orbit, record it, replay it through four estimators, draw it", "css_bringup", "demo"),
     "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly"),
     "replay": Verb("step estimators over a recorded bag and compare", "css_bringup", "replay"),
+    "hil": Verb("fly a mission in real time with a board in the loop, over serial or UDP", "css_bringup", "hil"),
     "bench": Verb("measure the speed of the graph, and of the Monte Carlo beside Basilisk", "css_bringup", "bench"),
     "record": Verb("record topics into an MCAP bag", "css_recording", "recorder"),
     "play": Verb("play a bag onto live topics", "css_recording", "player"),
