@@ -13,7 +13,6 @@ from css_drivers.converter import Converter
 from css_drivers.device_errors import GONE, TIMEOUT, DeviceError, of_device
 from css_drivers.text_line import LineBuffer, LineError, LineFormat, parse_line
 
-
 _MOST_MISSED = 10_000  # a counter that goes further ahead has begun anew
 
 

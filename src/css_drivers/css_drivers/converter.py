@@ -33,8 +33,14 @@ class Converter(Protocol):
         """
 
 
+_LEAST_LOOKS = 5
+
+
 class Patience:
-    """Waits for a chip that needs a known time: sleeps through most of it, then asks again and again."""
+    """Waits for a chip that needs a known time: sleeps through most of it, then asks again and again.
+
+    Time in which the process itself did not run is no fault of the chip: it is asked a few times in any case.
+    """
 
     def __init__(self, expected: float, limit: float, sleep: Callable[[float], object] = time.sleep) -> None:
         """Begins to wait.
@@ -45,13 +51,15 @@ class Patience:
             sleep: how to wait.
         """
         self._sleep = sleep
+        self._looks = 0
         self._end = time.monotonic() + limit
         self._pause = max(1e-4, 0.05 * expected)
         sleep(expected)
 
     def again(self) -> bool:
         """Waits a little longer; False when that is enough."""
-        if time.monotonic() >= self._end:
+        self._looks += 1
+        if self._looks >= _LEAST_LOOKS and time.monotonic() >= self._end:
             return False
         self._sleep(self._pause)
         return True

@@ -25,9 +25,7 @@ CONVERTER = choice("converter", ADS1115, (ADS1115, ADC128D818, MCP3208, LINE), "
 INPUTS = integers(
     "inputs", (), "-", "input of each cell, counted through all chips; empty: in their order from 0", low=0, high=255
 )
-SCAN_PERIOD = real(
-    "scan_period", 0.0, "s", "time from scan to scan of a chip; 0: mission.period", low=0.0, high=60.0
-)
+SCAN_PERIOD = real("scan_period", 0.0, "s", "time from scan to scan of a chip; 0: mission.period", low=0.0, high=60.0)
 FULL_SCALE = reals(
     "full_scale",
     (1.0,),
@@ -49,9 +47,7 @@ ADS_RATE = integer("ads1115.rate", 860, "1/s", "conversions a second: 8, 16, 32,
 ADC_REFERENCE = real("adc128d818.reference", 0.0, "V", "external reference; 0: the internal 2.56 V", low=0.0, high=5.5)
 SPI_BUS = integer("spi.bus", 0, "-", "bus of /dev/spidevBUS.DEVICE", low=0, high=255)
 SPI_DEVICE = integer("spi.device", 0, "-", "chip select of /dev/spidevBUS.DEVICE", low=0, high=255)
-SPI_CLOCK = integer(
-    "spi.clock", 1_000_000, "Hz", "clock of the bus", low=mcp3208.SLOWEST, high=mcp3208.FASTEST
-)
+SPI_CLOCK = integer("spi.clock", 1_000_000, "Hz", "clock of the bus", low=mcp3208.SLOWEST, high=mcp3208.FASTEST)
 MCP_REFERENCE = real("mcp3208.reference", 3.3, "V", "reference voltage", low=0.0, open_low=True, high=5.5)
 LINE_PORT = text("line.port", "/dev/ttyUSB0", "serial device, or a URL of pyserial")
 LINE_BAUD = integer("line.baud", 115_200, "1/s", "bits a second", low=50, high=4_000_000)

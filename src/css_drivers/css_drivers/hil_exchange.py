@@ -42,7 +42,7 @@ class Exchange:
     Attributes:
         counts: of frames, by the names above.
         round_trip: from the begin of sending to the command.
-        silent_since: time.monotonic() of the last answer, or of the begin.
+        silent_since: time.monotonic() of the last answer, or of the first frame; None before that.
         trouble: what the link said when it failed; empty while it is there.
     """
 
@@ -62,7 +62,7 @@ class Exchange:
         self._gone_corrupt = 0
         self.counts = Counter({name: 0 for name in (SENT, ANSWERED, *TROUBLES)})
         self.round_trip = LatencyRecord()
-        self.silent_since = time.monotonic()
+        self.silent_since: float | None = None
         self.trouble = ""
 
     def close(self) -> None:
@@ -84,6 +84,8 @@ class Exchange:
             the command, None when there is none in time.
         """
         begin = time.monotonic()
+        if self.silent_since is None:
+            self.silent_since = begin
         try:
             link = self._opened()
             command = None if link is None else self._exchange(link, sequence, stamp_ns, told, begin + within)
@@ -112,9 +114,7 @@ class Exchange:
         self.trouble = str(error)
         self.close()
 
-    def _exchange(
-        self, link: HilLink, sequence: int, stamp_ns: int, told: Sensors, end: float
-    ) -> Command | None:
+    def _exchange(self, link: HilLink, sequence: int, stamp_ns: int, told: Sensors, end: float) -> Command | None:
         for frame in [*self._reader.give_up_waiting(), *self._taken(link, 0.0)]:
             self._answer(frame, sequence, stamp_ns)  # nothing can answer what has not been sent
         link.send(sensors_frame(sequence, stamp_ns, told))
@@ -159,7 +159,9 @@ GREETING = 0xFFFFFFFF
 """Sequence of the frames that ask whether a board is there, before a flight."""
 
 
-def greet(link: HilLink, told: Sensors, wheels: int, stamp_ns: int, wait: float, stopped: Callable[[], bool]) -> Exchange:
+def greet(
+    link: HilLink, told: Sensors, wheels: int, stamp_ns: int, wait: float, stopped: Callable[[], bool]
+) -> Exchange:
     """Asks on an open link until a board answers, which may have to boot.
 
     Args:

@@ -13,6 +13,8 @@ import zlib
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
 SYNC = b"\x53\xa7"
 VERSION = 1
 KIND_SENSORS, KIND_COMMAND = 1, 2
@@ -64,7 +66,7 @@ PAYLOADS = {KIND_SENSORS: SENSORS, KIND_COMMAND: COMMAND}
 _HEADER = struct.Struct("<" + "".join(field.code for field in HEADER))
 HEADER_BYTES = len(SYNC) + _HEADER.size
 CRC_BYTES = 4
-_LARGEST = 3.4e38  # of 32 bits; a message that was damaged on its way may hold more
+_LARGEST = float(np.finfo(np.float32).max)  # a message that was damaged on its way may hold more
 
 
 class FrameError(ValueError):
@@ -180,7 +182,11 @@ class FrameReader:
         self._silent = False
 
     def give_up_waiting(self) -> list[Frame]:
-        """To be called once a cycle: a frame of which nothing came since the last call is none; what stood behind it."""
+        """To be called once a cycle: a frame of which nothing more came since the last call is none.
+
+        Returns:
+            frames that stood behind it.
+        """
         silent, self._silent = self._silent, True
         if not (silent and len(self._held) > 1):
             return []

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The frames as a header for C and as tables for people, of the one description in `hil_frame`.
 
-    python -m css_drivers.hil_header > hil_frame.h
+python -m css_drivers.hil_header > hil_frame.h
 """
 
 import struct
@@ -89,9 +89,7 @@ def tables() -> str:
     """The frames as tables in Markdown."""
     text = []
     for part, fields, _ in _PARTS:
-        rows = (
-            f"| `{f.name}` | `{_C_TYPES[f.code]}{_count(f)}` | {f.unit} | {f.meaning} |" for f in fields
-        )
+        rows = (f"| `{f.name}` | `{_C_TYPES[f.code]}{_count(f)}` | {f.unit} | {f.meaning} |" for f in fields)
         text.append(
             f"**{part.capitalize()}**\n\n| field | type | unit | meaning |\n|---|---|---|---|\n" + "\n".join(rows)
         )

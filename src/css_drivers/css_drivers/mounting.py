@@ -6,10 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from css_common.schema import Parameter, Table, Values, choice, real, reals, text, texts
+from css_common.schema import Parameter, Table, Values, choice, real, reals, text
 
-AXES = texts(
-    "axes", ("x", "y", "z"), "which axis of the sensor each of the body's x, y and z is, with its sign: x, -y, ..."
+AXES = text(
+    "axes",
+    "x y z",
+    "which axis of the sensor each of the body's x, y and z is, with its sign, for instance -y x z",
 )
 MOUNTING = reals(
     "mounting",
@@ -27,7 +29,9 @@ MAX_AGE = real("max_age", 0.5, "s", "a message older than that when it comes is 
 
 COMMON: Table = (AXES, MOUNTING, SENSOR_FRAME, STAMPS, MAX_AGE)
 
-_SIGNED = {f"{sign}{name}": (i, value) for i, name in enumerate("xyz") for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0))}
+_SIGNED = {
+    f"{sign}{name}": (i, value) for i, name in enumerate("xyz") for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0))
+}
 _ORTHOGONAL = 1e-6
 
 
@@ -36,15 +40,15 @@ def unit_parameter(units: dict[str, float], usual: str) -> Parameter[str]:
     return choice("unit", usual, tuple(units), "what the numbers of its messages are in")
 
 
-def permutation(axes: list[str]) -> np.ndarray:
+def permutation(axes: str) -> np.ndarray:
     """Matrix (3, 3) that takes components along the sensor's axes to those named.
 
     Raises:
         KeyError: a name that is none.
     """
     matrix = np.zeros((3, 3))
-    for row, name in enumerate(axes):
-        column, sign = _SIGNED[name.strip().lower()]
+    for row, name in enumerate(axes.lower().split()):
+        column, sign = _SIGNED[name]
         matrix[row, column] = sign
     return matrix
 
@@ -57,8 +61,9 @@ def sensor_to_body(values: Values) -> np.ndarray:
 def conflicts(values: Values) -> Iterator[str]:
     """What is wrong between the values, one message each."""
     axes = values[AXES]
-    if len(axes) != 3 or any(name.strip().lower() not in _SIGNED for name in axes):
-        yield f"axes: {axes} given, expected three of x, y, z with or without a -"
+    names = axes.lower().split()
+    if len(names) != 3 or any(name not in _SIGNED for name in names):
+        yield f"axes: {axes} given, expected three of x, y, z with or without a -, for instance -y x z"
         return
     matrix = permutation(axes)
     if np.any(np.abs(matrix).sum(axis=0) != 1.0):

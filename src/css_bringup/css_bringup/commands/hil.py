@@ -2,7 +2,8 @@
 """Flies a mission in real time with a board in the loop.
 
 The simulation sends what the sensors say to the board, each control cycle, and takes the board's
-command for wheels and rods back. docs/hil.md has the format of the frames and a client in C."""
+command for wheels and rods back. docs/hil.md has the format of the frames and a client in C.
+"""
 
 import sys
 

@@ -123,7 +123,9 @@ class _Watch:
 
 def _line(figures: dict[str, int | float | str]) -> str:
     counts = ", ".join(
-        f"{value} {key.removeprefix('frames_').replace('_', ' ')}" for key, value in figures.items() if "_ms_" not in key
+        f"{value} {key.removeprefix('frames_').replace('_', ' ')}"
+        for key, value in figures.items()
+        if "_ms_" not in key
     )
     times = {key.rpartition("_")[2]: value for key, value in figures.items() if key.startswith("round_trip_ms_")}
     if not times:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from css_common.codec import Sample
 from css_common.component import Outgoing, Output, Received, Standing
 from css_common.device import READING, Device, Reading, Stop
 from css_common.link import GAP
@@ -131,7 +132,7 @@ class CssAdc(Device):
         if reading.value is not None:
             self._latency.note(self.age_ns(reading))
 
-    def _gap(self, stamp_ns: int):
+    def _gap(self, stamp_ns: int) -> Sample:
         message = self.message("voltages", stamp_ns, saturated=0, voltages=np.zeros(len(self._dark)))
         message.frame_id = GAP
         return message

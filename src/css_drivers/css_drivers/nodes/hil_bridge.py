@@ -7,9 +7,11 @@ from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy as np
+from sensor_msgs.msg import Imu
 
 from css_common.codec import Sample
 from css_common.component import Component, Input, Outgoing, Output, Received, Standing
+from css_common.readings import Readings
 from css_common.run import node_main
 from css_common.schema import Table, Values, flag, integer, real
 from css_common.sections import PERIOD, ROD_MAX_DIPOLE, WHEEL_MAX_TORQUE, needed_of_wheels, wheel_axes
@@ -34,14 +36,17 @@ from css_drivers.hil_link import BITS_PER_BYTE, HilLink, open_link
 from css_drivers.relay import NOTHING
 from css_msgs.msg import CssVoltages, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand
 from css_sensors.cells import LARGEST_READING, NORMALS, SMALLEST_READING
-from css_common.readings import Readings
-from sensor_msgs.msg import Imu
 
 ANSWER_WITHIN = real(
     "answer_within", 0.8, "-", "share of the control cycle that the board has for its answer", low=0.01, high=0.95
 )
 HOLD_CYCLES = integer(
-    "hold_cycles", 0, "-", "so many cycles without an answer keep the last command; then actuators rest", low=0, high=1000
+    "hold_cycles",
+    0,
+    "-",
+    "so many cycles without an answer keep the last command; then actuators rest",
+    low=0,
+    high=1000,
 )
 BOARD_ESTIMATES = flag("board_estimates", False, "publish the board's direction to the Sun as an estimate")
 
@@ -74,9 +79,7 @@ class HilBridge(Component):
         inputs = [cells, gyro, field_input(values)]
         if len(wheel_axes(values)):
             lengths = {"speed": len(values.wheels.axes)}
-            inputs.append(
-                Input("wheels", "wheels/state", WheelState, required=False, lengths=lengths, used=("speed",))
-            )
+            inputs.append(Input("wheels", "wheels/state", WheelState, required=False, lengths=lengths, used=("speed",)))
         return tuple(inputs)
 
     @classmethod
@@ -126,9 +129,10 @@ class HilBridge(Component):
 
     @property
     def silent_for(self) -> float:
-        """Wall time [s] since the board's last answer."""
+        """Wall time [s] since the board's last answer, or since it was first asked."""
         assert self._exchange is not None
-        return time.monotonic() - self._exchange.silent_since
+        since = self._exchange.silent_since
+        return 0.0 if since is None else time.monotonic() - since
 
     @property
     def trouble(self) -> str:
