@@ -3,7 +3,7 @@
 
 import pytest
 from chip_models import Adc128d818Model, Ads1115Model, FakeSMBus, Mcp3208Model
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_drivers import adc128d818, ads1115, mcp3208
@@ -38,6 +38,7 @@ def test_ads1115_reads_what_is_at_its_inputs(volts, full_scale, inputs):
         assert read.at_limit == (volts[channel] >= full_scale - 1.5 * lsb)
 
 
+@settings(max_examples=20)  # a round takes its 50 ms
 @given(st.lists(st.floats(-0.3, 5.5), min_size=8, max_size=8), st.sampled_from([0.0, 3.3, 5.0]))
 def test_adc128d818_reads_what_is_at_its_inputs(volts, reference):
     inputs = [5, 0, 7, 2]
