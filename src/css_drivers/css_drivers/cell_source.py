@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from css_common.device import Stop
 from css_drivers.converter import Converter
-from css_drivers.device_errors import GONE, TIMEOUT, DeviceError, of_device
+from css_drivers.device_errors import GONE, TIMEOUT, DeviceError, of_device, reason
 from css_drivers.text_line import LineBuffer, LineError, LineFormat, parse_line
 
 _MOST_MISSED = 10_000  # a counter that goes further ahead has begun anew
@@ -60,6 +60,14 @@ class CellSource(ABC):
         """
 
 
+class _Connected(NamedTuple):
+    """A chip that cells hang on."""
+
+    chip: Converter
+    cells: list[int]
+    channels: list[int]  # of the chip, for each of these
+
+
 class ChipSource(CellSource):
     """Cells on one or several chips of a bus, read one after the other."""
 
@@ -77,16 +85,20 @@ class ChipSource(CellSource):
         self._open_bus, self._make_chips = open_bus, make_chips
         self._inputs = inputs
         self._bus: Any = None
-        self._chips: Sequence[Converter] = ()
+        self._chips: list[_Connected] = []
 
     def open(self) -> None:
         self._bus = self._open_bus()
-        self._chips = self._make_chips(self._bus)
-        for chip in self._chips:
-            chip.begin()
+        first = 0
+        for chip in self._make_chips(self._bus):
+            cells = [i for i, channel in enumerate(self._inputs) if first <= channel < first + chip.channels]
+            if cells:  # else it need not be there
+                self._chips.append(_Connected(chip, cells, [self._inputs[i] - first for i in cells]))
+                chip.begin()
+            first += chip.channels
 
     def close(self) -> None:
-        bus, self._bus, self._chips = self._bus, None, ()
+        bus, self._bus, self._chips = self._bus, None, []
         if bus is not None:
             try:
                 bus.close()
@@ -96,14 +108,10 @@ class ChipSource(CellSource):
     def scan(self, stop: Stop) -> Scan:
         values, at_limit = [math.nan] * len(self._inputs), 0
         wall, begin = time.time_ns(), time.monotonic_ns()
-        first = 0
-        for chip in self._chips:
-            mine = [i for i, channel in enumerate(self._inputs) if first <= channel < first + chip.channels]
-            found = chip.scan([self._inputs[i] - first for i in mine]) if mine else ()
-            for i, conversion in zip(mine, found, strict=True):
+        for chip, cells, channels in self._chips:
+            for i, conversion in zip(cells, chip.scan(channels), strict=True):
                 values[i] = conversion.volts
                 at_limit |= conversion.at_limit << i
-            first += chip.channels
         took = time.monotonic_ns() - begin
         return Scan(tuple(values), at_limit, wall + took // 2, begin + took // 2, took)
 
@@ -136,7 +144,7 @@ class LineSource(CellSource):
         try:
             self._port = serial.serial_for_url(self._name, baudrate=self._baud, timeout=min(0.05, self._patience))
         except (OSError, ValueError) as error:
-            raise DeviceError(GONE, f"{self._name}: {_reason(error)}") from error
+            raise DeviceError(GONE, f"{self._name}: {reason(error)}") from error
         self._buffer, self._last = LineBuffer(), None
 
     def close(self) -> None:
@@ -186,8 +194,3 @@ class LineSource(CellSource):
             return 0
         missed = sequence - last - 1
         return missed if 0 < missed <= _MOST_MISSED else 0
-
-
-def _reason(error: Exception) -> str:
-    # pyserial packs the text of the system into its own
-    return str(getattr(error, "strerror", None) or error)

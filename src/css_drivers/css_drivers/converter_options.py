@@ -41,7 +41,14 @@ STUCK_SCANS = integer(
     "stuck_scans", 100, "-", "so many scans without any change of a lit cell are said; 0: never", low=0, high=1_000_000
 )
 I2C_BUS = integer("i2c.bus", 1, "-", "number of the bus, /dev/i2c-N", low=0, high=255)
-I2C_ADDRESSES = integers("i2c.addresses", (0x48,), "-", "of the chips, in the order of their inputs", low=0, high=127)
+I2C_ADDRESSES = integers(
+    "i2c.addresses",
+    (0x48, 0x49),
+    "-",
+    "of the chips, in the order of their inputs; one without a cell need not be there",
+    low=0,
+    high=127,
+)
 ADS_RANGE = real("ads1115.range", 4.096, "V", "full scale: 6.144, 4.096, 2.048, 1.024, 0.512 or 0.256")
 ADS_RATE = integer("ads1115.rate", 860, "1/s", "conversions a second: 8, 16, 32, 64, 128, 250, 475 or 860")
 ADC_REFERENCE = real("adc128d818.reference", 0.0, "V", "external reference; 0: the internal 2.56 V", low=0.0, high=5.5)

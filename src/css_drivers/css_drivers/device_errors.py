@@ -2,6 +2,7 @@
 """What may go wrong with a device, by kind: all that a driver does about it hangs on that."""
 
 import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -32,6 +33,12 @@ class DeviceError(Exception):
         self.kind = kind
 
 
+def reason(error: Exception) -> str:
+    """Why, in the system's words where it is the system that refused: libraries wrap them into their own."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if isinstance(number, int) else str(error)
+
+
 @contextmanager
 def of_device(name: str) -> Iterator[None]:
     """Makes what Linux says of a device a `DeviceError` that names it."""
@@ -39,4 +46,4 @@ def of_device(name: str) -> Iterator[None]:
         yield
     except OSError as error:
         kind = REFUSED if error.errno in _REFUSING else TIMEOUT if error.errno in _LATE else GONE
-        raise DeviceError(kind, f"{name}: {error.strerror or error}") from error
+        raise DeviceError(kind, f"{name}: {reason(error)}") from error

@@ -8,7 +8,7 @@ from abc import ABC, abstractmethod
 from typing import Any
 
 from css_common.schema import Table, Values, choice, integer, text
-from css_drivers.device_errors import GONE, DeviceError, of_device
+from css_drivers.device_errors import GONE, DeviceError, of_device, reason
 
 SERIAL, UDP = "serial", "udp"
 LINK = choice("link", SERIAL, (SERIAL, UDP), "how the board is reached")
@@ -72,7 +72,7 @@ class SerialLink(HilLink):
         try:
             self._port: Any = serial.serial_for_url(port, baudrate=baud, timeout=0.0, write_timeout=1.0)
         except (OSError, ValueError) as error:
-            raise DeviceError(GONE, f"{port}: {getattr(error, 'strerror', None) or error}") from error
+            raise DeviceError(GONE, f"{port}: {reason(error)}") from error
 
     def send(self, data: bytes) -> None:
         with of_device(self.name):
@@ -121,7 +121,7 @@ class UdpLink(HilLink):
         except ConnectionRefusedError:
             return  # nobody listens there yet: news of an earlier datagram
         except OSError as error:
-            raise DeviceError(GONE, f"{self.name}: {error.strerror}") from error
+            raise DeviceError(GONE, f"{self.name}: {reason(error)}") from error
 
     def receive(self, seconds: float) -> bytes:
         end = time.monotonic() + seconds
@@ -134,7 +134,7 @@ class UdpLink(HilLink):
             except ConnectionRefusedError:
                 continue
             except OSError as error:
-                raise DeviceError(GONE, f"{self.name}: {error.strerror}") from error
+                raise DeviceError(GONE, f"{self.name}: {reason(error)}") from error
             if sender[0] == self._address[0]:
                 return data
 

@@ -248,7 +248,7 @@ def test_node_that_is_deactivated_lets_the_bus_go_and_takes_it_again(bench, miss
     [
         ("inputs: [0, 1]", "a different one for each of the 3 cells"),
         ("inputs: [0, 1, 1]", "a different one for each of the 3 cells"),
-        ("inputs: [0, 1, 4]", "expected at most 3"),
+        ("inputs: [0, 1, 8]", "expected at most 7"),
         ("i2c: {addresses: [40]}", "0x48"),
         ("full_scale: [1.0, 2.0]", "one for each of the 3 cells"),
         ("ads1115: {range: 5.0}", "6.144"),
