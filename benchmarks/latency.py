@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Latency from cell to command: a microcontroller's line in, through driver, estimator and control, the wheels' torque out.
+"""Latency from cell to command: a microcontroller's line in, through driver, estimator and control, torques out.
 
 Each node is a process of its own on the wall clock, started with one parameter file: `css_adc` reads lines on a
 pseudo-terminal, `imu_relay` hears an IMU at 50 Hz, `ekf` and `mrp_control` pair messages by the latest. A line begins
@@ -81,9 +81,7 @@ class Devices:
         state = node.create_publisher(WheelState, "wheels/state", LOOP_PUBLISHER)
 
         def say_rate() -> None:
-            rates = codec_of(Imu).sample(
-                time.time_ns(), "imu_link", angular_velocity=np.array([0.01, 0.0, -0.02])
-            )
+            rates = codec_of(Imu).sample(time.time_ns(), "imu_link", angular_velocity=np.array([0.01, 0.0, -0.02]))
             imu.publish(codec_of(Imu).encode(rates))
 
         def say_speeds() -> None:
@@ -129,14 +127,12 @@ def start_nodes(port: str, rate: float, logs: Path) -> list[subprocess.Popen]:
         program = Path(get_package_prefix(package)) / "lib" / package / executable
         files = [argument for file in (SAMPLE, own) for argument in ("--params-file", str(file))]
         with (logs / f"{executable}.log").open("w") as log:
-            processes.append(
-                subprocess.Popen([program, "--ros-args", *files], stdout=log, stderr=subprocess.STDOUT)
-            )
+            processes.append(subprocess.Popen([program, "--ros-args", *files], stdout=log, stderr=subprocess.STDOUT))
     return processes
 
 
 def latencies(written: list[int], heard: list[tuple[int, int]]) -> np.ndarray:
-    """Latencies [ms] of messages, given as stamps and arrivals [ns]: each from the last line written before its stamp."""
+    """Latencies [ms] of messages, by stamp and arrival [ns], each from the last line written before its stamp."""
     begins = np.array(written)
     stamps, arrivals = np.array(heard, np.int64).reshape(-1, 2).T
     which = np.searchsorted(begins, stamps, side="right") - 1
@@ -226,6 +222,7 @@ def main() -> int:
         result[way] = {"messages": len(given), **{f"p{p:g}": v for p, v in zip(PERCENTILES, figures, strict=False)}}
         result[way]["largest"] = figures[-1]
     console.print(table)
+    console.print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f}")
     if arguments.figure is not None:
         draw(found, arguments.figure, arguments.rate)
     if arguments.json:

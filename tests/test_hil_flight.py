@@ -11,6 +11,7 @@ import select
 import socket
 import threading
 import tty
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,6 +37,18 @@ def good(frame, sequence=None):
 
 class Board(threading.Thread):
     """A board in Python. `answer` makes of a frame what it sends back, as several pieces."""
+
+    file: Any
+    options: list[str]
+
+    def _open(self):
+        raise NotImplementedError
+
+    def _receive(self):
+        raise NotImplementedError
+
+    def _close(self):
+        raise NotImplementedError
 
     def __init__(self, answer=lambda frame: [good(frame)]):
         super().__init__(daemon=True)
@@ -148,7 +161,9 @@ def test_lost_late_and_damaged_frames_are_safe_counted_and_said(fly):
 
 
 def test_board_that_falls_silent_ends_the_flight_with_its_recording_whole(fly):
-    code, result, printed, bag, _ = fly(UdpBoard, lambda frame: [good(frame)] if frame.sequence < 2 else [], "--silence", "1")
+    code, result, printed, bag, _ = fly(
+        UdpBoard, lambda frame: [good(frame)] if frame.sequence < 2 else [], "--silence", "1"
+    )
     assert code == 1
     assert "has not answered for 1 s" in result["failure"]
     assert result["hil"]["frames_answered"] == 2

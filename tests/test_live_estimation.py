@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimators on devices with clocks of their own: stamps that never coincide, jitter, gaps, messages that come late.
 
-One parameter file, as users of ROS write them, serves the estimator; its node runs on a real executor. Stamps are made up,
-so nothing waits for a clock.
+One parameter file, as users of ROS write them, serves the estimator; its node runs on a real executor. Stamps are made
+up, so nothing waits for a clock.
 """
 
 from pathlib import Path
@@ -75,7 +75,9 @@ class Flight:
         voltages = np.maximum(0.0, sun_b(cells) @ NORMALS.T)
         for begin, end in [dark] if dark else []:
             voltages[(cells > begin) & (cells < end)] = 0.0
-        events = [(t, "css/voltages", CssVoltages, {"voltages": v}, "bus") for t, v in zip(cells, voltages, strict=True)]
+        events = [
+            (t, "css/voltages", CssVoltages, {"voltages": v}, "bus") for t, v in zip(cells, voltages, strict=True)
+        ]
         covariance = 1e-8 * np.eye(3).ravel()
         rates = {"angular_velocity": RATE, "angular_velocity_covariance": covariance}
         events += [(t + late, "gyro/imu", Imu, rates, "imu_link") for t in gyro]

@@ -7,7 +7,7 @@ from css_common.host import REJECTED, STRANGER
 from css_common.mission import Mission
 from css_drivers import hil_exchange
 
-Counters = Mapping[str, int | float | str]
+Counters = Mapping[str, int | float]
 
 _OF_ANY_NODE = {
     "cycle_failed": "{} cycles failed and gave no output",

@@ -125,7 +125,7 @@ class Standing(NamedTuple):
 
     warning: str = ""  # what is not as it should be, in one line
     failing: bool = False  # nothing useful comes of it now
-    figures: Mapping[str, int | float | str] = {}
+    figures: Mapping[str, int | float] = {}
 
 
 class Smoothing(NamedTuple):

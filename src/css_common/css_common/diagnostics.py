@@ -26,7 +26,7 @@ class Health(NamedTuple):
 
     level: bytes
     message: str
-    counters: Mapping[str, int | float | str]
+    counters: Mapping[str, int | float]
     stamp_ns: int
     left_out: tuple[str, ...] = ()
 

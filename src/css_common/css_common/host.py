@@ -474,7 +474,7 @@ class ComponentNode(LifecycleNode):
 
     def health(self) -> Health:
         """Level, one line and counters for /diagnostics."""
-        counters: dict[str, int | float | str] = dict(self.counters)
+        counters: dict[str, int | float] = dict(self.counters)
         for key, edge in self.edges.items():
             counters[f"{key}.accepted"] = edge.accepted
             if edge.repeated:

@@ -102,7 +102,7 @@ def inputs_of(values: Values) -> list[int]:
 def line_format(values: Values) -> LineFormat:
     """How the lines of a mission are written."""
     cells = len(values[NORMALS])
-    fields = tuple(values[LINE_FIELDS]) or usual_fields(cells)
+    fields = tuple(values.line.fields) or usual_fields(cells)
     return LineFormat(values[LINE_PREFIX], values[LINE_SEPARATOR], values[LINE_CHECKSUM], fields, cells)
 
 

@@ -42,7 +42,7 @@ class Exchange:
     Attributes:
         counts: of frames, by the names above.
         round_trip: from the begin of sending to the command.
-        silent_since: time.monotonic() of the last answer, or of the first frame; None before that.
+        silent_since: time.monotonic() of the first frame since the last answer; None while there is none.
         trouble: what the link said when it failed; empty while it is there.
     """
 
@@ -97,8 +97,8 @@ class Exchange:
             self.counts[DOWN if self._link is None else LOST] += 1
             return None
         self.counts[ANSWERED] += 1
-        self.silent_since = time.monotonic()
-        self.round_trip.note(round((self.silent_since - begin) * 1e9))
+        self.silent_since = None
+        self.round_trip.note(round((time.monotonic() - begin) * 1e9))
         return command
 
     def _opened(self) -> HilLink | None:

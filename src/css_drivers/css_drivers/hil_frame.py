@@ -11,7 +11,7 @@ import math
 import struct
 import zlib
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,7 +27,7 @@ class Field(NamedTuple):
 
     name: str
     code: str  # of struct: B, H, I, Q, f
-    count: int | str  # of elements, or the name of the field before it that says it
+    elements: int | str  # of elements, or the name of the field before it that says it
     unit: str
     meaning: str
 
@@ -100,13 +100,14 @@ class Frame(NamedTuple):
     kind: int
     sequence: int
     stamp_ns: int
-    values: dict[str, float | int | tuple[float, ...]]
+    values: dict[str, Any]  # a number, or a tuple of them
 
 
 def payload_bytes(kind: int, **counts: int) -> int:
     """Length of a payload with so many `cells`, `wheels`, `rods`."""
     return sum(
-        struct.calcsize(f.code) * (f.count if isinstance(f.count, int) else counts[f.count]) for f in PAYLOADS[kind]
+        struct.calcsize(f.code) * (f.elements if isinstance(f.elements, int) else counts[f.elements])
+        for f in PAYLOADS[kind]
     )
 
 
@@ -127,10 +128,10 @@ def command_frame(sequence: int, stamp_ns: int, command: Command) -> bytes:
 
 
 def _frame(kind: int, sequence: int, stamp_ns: int, given: dict) -> bytes:
-    code, values = "<", []
+    code, values = "<", list[float]()
     for field in PAYLOADS[kind]:
         value = given[field.name]
-        elements = (value,) if field.count == 1 else tuple(value)
+        elements = (value,) if field.elements == 1 else tuple(value)
         if field.code == "f":
             elements = tuple(map(_held_by_32_bits, elements))
         code += f"{len(elements)}{field.code}"
@@ -144,23 +145,23 @@ def _held_by_32_bits(value: float) -> float:
     return value if value != value else max(-_LARGEST, min(_LARGEST, value))
 
 
-def parse_payload(kind: int, payload: bytes) -> dict[str, float | int | tuple[float, ...]]:
+def parse_payload(kind: int, payload: bytes) -> dict[str, Any]:
     """The values of a payload by name.
 
     Raises:
         FrameError: its length is not what it says of itself, or a number is too large.
     """
-    values: dict[str, float | int | tuple[float, ...]] = {}
+    values: dict[str, Any] = {}
     at = 0
     for field in PAYLOADS[kind]:
-        count = field.count if isinstance(field.count, int) else int(values[field.count])  # type: ignore[arg-type]
+        count = field.elements if isinstance(field.elements, int) else int(values[field.elements])
         code = struct.Struct(f"<{count}{field.code}")
         if at + code.size > len(payload):
             raise FrameError(f"{len(payload)} bytes of payload end before {field.name}")
         given = code.unpack_from(payload, at)
         if field.name in ("cells", "wheels", "rods") and given[0] > MOST_UNITS:
             raise FrameError(f"{field.name}: {given[0]} given, expected at most {MOST_UNITS}")
-        values[field.name] = given[0] if field.count == 1 else given
+        values[field.name] = given[0] if field.elements == 1 else given
         at += code.size
     if at != len(payload):
         raise FrameError(f"{len(payload)} bytes of payload given, it says of itself that it has {at}")
@@ -200,7 +201,7 @@ class FrameReader:
         return self._found()
 
     def _found(self) -> list[Frame]:
-        frames = []
+        frames: list[Frame] = []
         while True:
             at = self._held.find(SYNC)
             if at < 0:
@@ -257,7 +258,7 @@ def command_of(frame: Frame, wheels: int, rods: int) -> Command:
     for name, expected in (("wheels", wheels), ("rods", rods)):
         if values[name] != expected:
             raise FrameError(f"command for {values[name]} {name} given, expected {expected}")
-    command = Command(*(values[name] for name in Command._fields))  # type: ignore[arg-type]
+    command = Command(*(values[name] for name in Command._fields))
     for name in ("torque", "dipole", "sun"):
         if not all(map(math.isfinite, getattr(command, name))):
             raise FrameError(f"command with a {name} that is no number")

@@ -74,15 +74,15 @@ def _macros(part: str, fields: tuple[Field, ...], begin: int) -> Iterator[str]:
         if field is None:
             return
         size = struct.calcsize("<" + field.code)
-        if isinstance(field.count, int):
-            at += size * field.count
+        if isinstance(field.elements, int):
+            at += size * field.elements
         else:
-            names.append(field.count)
-            counted += f" + {size}u * ({field.count})"
+            names.append(field.elements)
+            counted += f" + {size}u * ({field.elements})"
 
 
 def _count(field: Field) -> str:
-    return "" if field.count == 1 else f"[{field.count}]"
+    return "" if field.elements == 1 else f"[{field.elements}]"
 
 
 def tables() -> str:

@@ -3,6 +3,7 @@
 
 import errno
 import math
+from typing import ClassVar
 
 
 def nack(*_):
@@ -12,7 +13,7 @@ def nack(*_):
 class Ads1115Model:
     """Config and conversion register, a multiplexer, an amplifier, and time counted in reads of the config register."""
 
-    FULL_SCALES = {0: 6.144, 1: 4.096, 2: 2.048, 3: 1.024, 4: 0.512, 5: 0.256, 6: 0.256, 7: 0.256}
+    FULL_SCALES: ClassVar[dict[int, float]] = {0: 6.144, 1: 4.096, 2: 2.048, 3: 1.024, 4: 0.512, 5: 0.256, 6: 0.256, 7: 0.256}
 
     def __init__(self, volts=(0.0, 0.0, 0.0, 0.0), busy_reads=1):
         self.volts = list(volts)
@@ -106,6 +107,7 @@ class FakeSMBus:
     def __init__(self, chips):
         self.chips = chips
         self.gone = self.closed = False
+        self.opened: list[int] = []
 
     def _chip(self, address):
         if self.gone:

@@ -59,7 +59,6 @@ def is_gap(message):
 def chip_bus(monkeypatch):
     """The bus that every driver opens."""
     bus = FakeSMBus({0x48: Ads1115Model(VOLTS)})
-    bus.opened = []
 
     def opened(number):
         if bus.gone:

@@ -67,12 +67,13 @@ def free_port():
 @pytest.fixture(params=["udp", "serial"])
 def board(client, request):
     """The client at work, and the link to it."""
+    link: HilLink
     if request.param == "udp":
         port = free_port()
         link, arguments = UdpLink("127.0.0.1", port), ["udp", str(port)]
     else:
-        link = PtyLink()
-        arguments = [link.port]
+        link = line = PtyLink()
+        arguments = [line.port]
     process = subprocess.Popen([client, *arguments])
     try:
         yield link

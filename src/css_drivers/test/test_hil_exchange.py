@@ -105,11 +105,12 @@ def test_whole_frames_that_answer_nothing(wrong):
 
 
 def test_board_that_is_pulled_out_and_plugged_in_again(monkeypatch):
-    links = []
+    links: list[ScriptedLink] = []
+    refused: list[bool] = []
 
     def open_link():
-        if links and links[-1].gone == "still":
-            links[-1].gone = True
+        if refused:
+            refused.pop()
             raise DeviceError(GONE, "board: not there")
         links.append(ScriptedLink(lambda k, t: [good(k, t)]))
         return links[-1]
@@ -117,7 +118,8 @@ def test_board_that_is_pulled_out_and_plugged_in_again(monkeypatch):
     monkeypatch.setattr("css_drivers.hil_exchange._RETRY", 0.0)
     exchange = Exchange(open_link, 2, 0)
     assert exchange.ask(0, 0, TOLD, WITHIN) == COMMAND
-    links[-1].gone = "still"
+    links[-1].gone = True
+    refused.append(True)
     assert exchange.ask(1, 1, TOLD, WITHIN) is None
     assert links[0].closed
     assert "No such device" in exchange.trouble

@@ -51,7 +51,7 @@ def mag(bench, mission):
 
 
 def test_rates_are_turned_scaled_and_keep_their_covariance(imu):
-    relay = imu('axes: -y x z, unit: deg/s, sensor_frame: imu_link')
+    relay = imu("axes: -y x z, unit: deg/s, sensor_frame: imu_link")
     message = relay.one(
         frame="imu_link",
         angular_velocity=np.array([10.0, 20.0, 30.0]),

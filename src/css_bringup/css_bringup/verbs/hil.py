@@ -116,12 +116,12 @@ class _Watch:
         late = self._late_cycles.get("deadline_missed", 0)
         return [f"real time was missed in {late} cycles, which came late"] if late else []
 
-    def figures(self) -> dict[str, int | float | str]:
+    def figures(self) -> dict[str, int | float]:
         """Frames by what became of them, and round trips [ms]."""
         return {} if self._bridge is None else dict(self._bridge.standing().figures)
 
 
-def _line(figures: dict[str, int | float | str]) -> str:
+def _line(figures: dict[str, int | float]) -> str:
     counts = ", ".join(
         f"{value} {key.removeprefix('frames_').replace('_', ' ')}"
         for key, value in figures.items()

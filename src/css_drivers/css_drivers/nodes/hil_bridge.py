@@ -129,7 +129,7 @@ class HilBridge(Component):
 
     @property
     def silent_for(self) -> float:
-        """Wall time [s] since the board's last answer, or since it was first asked."""
+        """Wall time [s] since the board was asked what it has not answered; 0 when it answers."""
         assert self._exchange is not None
         since = self._exchange.silent_since
         return 0.0 if since is None else time.monotonic() - since
@@ -166,13 +166,14 @@ class HilBridge(Component):
         cells, gyro, field = received["cells"], received.get("gyro"), received.get("field")
         assert cells is not None  # a required input
         wheels = received.get("wheels")
-        has_gyro = gyro is not None and gyro.angular_velocity_covariance[0] != -1.0
-        has_field = field is not None and field.magnetic_field_covariance[0] != -1.0
+        rate = None if gyro is None or gyro.angular_velocity_covariance[0] == -1.0 else gyro.angular_velocity
+        measured = None if field is None or field.magnetic_field_covariance[0] == -1.0 else field.magnetic_field
+        flags = ((rate, HAS_GYRO), (measured, HAS_FIELD), (wheels, HAS_WHEELS))
         return Sensors(
-            flags=has_gyro * HAS_GYRO | has_field * HAS_FIELD | (wheels is not None) * HAS_WHEELS,
+            flags=sum(flag for given, flag in flags if given is not None),
             period=round(self.period_ns * 1e-3),
-            gyro=_vector(gyro.angular_velocity) if has_gyro else _NONE3,
-            field=_vector(field.magnetic_field) if has_field else _NONE3,
+            gyro=_NONE3 if rate is None else _vector(rate),
+            field=_NONE3 if measured is None else _vector(measured),
             cell=cells.voltages.tolist(),
             wheel_speed=(0.0,) * self._wheels if wheels is None else _vector(wheels.speed),
             rods=self._rods,
@@ -196,7 +197,7 @@ class HilBridge(Component):
         """What became of the frames, and how long the board took."""
         assert self._exchange is not None
         exchange = self._exchange
-        figures: dict[str, int | float | str] = {**exchange.counts, **exchange.round_trip.figures("round_trip")}
+        figures: dict[str, int | float] = {**exchange.counts, **exchange.round_trip.figures("round_trip")}
         if exchange.trouble:
             return Standing(f"link to the board: {exchange.trouble}", True, figures)
         if self._since_answer > 0:
