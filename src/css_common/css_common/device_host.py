@@ -19,11 +19,12 @@ class DeviceNode(ComponentNode):
     """Hosts a `Device`."""
 
     component: Device
+    # of the class, as a node that is refused is destroyed before it is whole
+    _stop: Stop | None = None
+    _thread: threading.Thread | None = None
 
     def __init__(self, *args, **kwargs) -> None:
         super().__init__(*args, **kwargs)
-        self._stop: Stop | None = None
-        self._thread: threading.Thread | None = None
         self._readings: SimpleQueue[Reading | Exception] = SimpleQueue()
 
     def _activate(self) -> None:

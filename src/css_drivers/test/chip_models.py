@@ -13,7 +13,16 @@ def nack(*_):
 class Ads1115Model:
     """Config and conversion register, a multiplexer, an amplifier, and time counted in reads of the config register."""
 
-    FULL_SCALES: ClassVar[dict[int, float]] = {0: 6.144, 1: 4.096, 2: 2.048, 3: 1.024, 4: 0.512, 5: 0.256, 6: 0.256, 7: 0.256}
+    FULL_SCALES: ClassVar[dict[int, float]] = {
+        0: 6.144,
+        1: 4.096,
+        2: 2.048,
+        3: 1.024,
+        4: 0.512,
+        5: 0.256,
+        6: 0.256,
+        7: 0.256,
+    }
 
     def __init__(self, volts=(0.0, 0.0, 0.0, 0.0), busy_reads=1):
         self.volts = list(volts)
