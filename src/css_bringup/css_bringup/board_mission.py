@@ -39,8 +39,5 @@ def with_board(mission: Mission, changes: Mapping[str, str]) -> tuple[Mission, l
         names = [node.name for node in kept]
         return is_shared(section, mission.namespace) or any(is_for(section, n, mission.namespace) for n in names)
 
-    left = {name: dict(values) for name, values in sections.items() if is_used(name) or name == BRIDGE[2]}
-    own = left.pop(BRIDGE[2], {})
-    without = Mission(mission.origin, left, mission.namespace)
-    texts = {key: str(value) for key, value in own.items()} | dict(changes)
-    return without.with_node(BRIDGE, texts), replaced
+    left = {name: dict(values) for name, values in sections.items() if is_used(name)}
+    return Mission(mission.origin, left, mission.namespace).with_node(BRIDGE, changes), replaced

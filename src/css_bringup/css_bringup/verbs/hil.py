@@ -57,6 +57,8 @@ def run(arguments: argparse.Namespace) -> int:
 def _bridge_options(arguments: argparse.Namespace) -> dict[str, str]:
     """Parameters of the bridge that the options ask for."""
     changes = {"board_estimates": "true"} if arguments.estimate else {}
+    given = {"answer_within": arguments.within, "hold_cycles": arguments.hold}
+    changes |= {key: str(value) for key, value in given.items() if value is not None}
     if arguments.serial is not None:
         changes |= {"link": "serial", "serial.port": arguments.serial}
         if arguments.listen is not None:
