@@ -8,6 +8,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 from hypothesis import given
 from hypothesis import strategies as st
+from rclpy.qos import qos_profile_sensor_data
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Imu, MagneticField
 
@@ -77,6 +78,20 @@ def test_fields_come_in_tesla(mag, unit, factor):
     relay = mag(f"unit: {unit}, mounting: {turn.ravel().tolist()}")
     message = relay.one(magnetic_field=np.array([1.0, 2.0, 3.0]))
     np.testing.assert_allclose(message.magnetic_field, factor * (turn @ [1.0, 2.0, 3.0]))
+
+
+def test_driver_that_publishes_with_best_effort_is_heard(imu, bench):
+    relay = imu()
+    publisher = bench.node.create_publisher(Imu, "imu/data", qos_profile_sensor_data)
+    codec = codec_of(Imu)
+
+    def hears():
+        publisher.publish(codec.encode(codec.sample(time.time_ns(), "bus", angular_velocity=np.ones(3))))
+        bench.executor.spin_once(timeout_sec=0.02)
+        return relay.heard
+
+    bench.until(hears, "it is passed on")
+    assert relay.heard[0].angular_velocity.tolist() == [1.0, 1.0, 1.0]
 
 
 def test_old_messages_are_left_out_and_said(imu, bench):
