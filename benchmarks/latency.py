@@ -27,7 +27,7 @@ from ament_index_python.packages import get_package_prefix
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
 
-from css_analysis.figure_style import colours, legend, new_figure, save, style
+from css_analysis.figure_style import colours, new_figure, save, style
 from css_analysis.readable_table import ReadableTable
 from css_bringup.options import console
 from css_common import domains, network
@@ -194,8 +194,9 @@ def draw(found: dict[str, np.ndarray], path: Path, rate: float) -> None:
             high = np.percentile(given, 99.0)
             axes.step(ordered, above, color=colour, label=f"{way}: median {np.median(given):.2f}, 99 % {high:.2f} ms")
         axes.set(xscale="log", yscale="log", xlabel="latency [ms]", ylabel="share of messages above [-]")
-        axes.set_title(f"From a cell's line to the wheels' torque, {rate:g} lines a second, a process per node")
-        legend(axes)
+        axes.set_title(f"From a cell's line to the wheels' torque, {rate:g} lines a second")
+        axes.xaxis.set_major_formatter("{x:g}")
+        axes.legend(loc="lower left", frameon=False)
         save(figure, path)
 
 
