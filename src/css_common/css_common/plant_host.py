@@ -176,6 +176,8 @@ class PlantNode(ComponentNode):
         self._begun = True
         self._warned.clear()
         self._mark_begin()
+        if self._pace_timer is not None:
+            self._pace_timer.reset()  # it has run since the node was configured: the first cycle has its whole period
         try:
             outgoing = self.component.begin()
         except Exception as error:
