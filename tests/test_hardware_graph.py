@@ -50,7 +50,7 @@ class Devices(threading.Thread):
             if now >= due[0] and not self.mute:
                 due[0] = now + 0.05 * random.uniform(0.7, 1.3)
                 sequence += 1
-                os.write(self.end, write_line(FORM, sequence, VOLTS))
+                os.write(self.end, write_line(FORM, sequence, VOLTS.tolist()))
             if now >= due[1]:
                 due[1] = now + 0.02 * random.uniform(0.5, 1.5)
                 rate = {"angular_velocity": np.array([0.0, -0.018, 0.024])}

@@ -3,7 +3,7 @@
 
 import math
 import time
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -25,7 +25,7 @@ class Rig:
 
     def __init__(self, bench, mission):
         self.bench = bench
-        self.kind: Any = find_component("testbed", "probe")
+        self.kind = cast(Any, find_component("testbed", "probe"))
         while not self.kind.told.empty():
             self.kind.told.get()
         self.kind.begun.clear()

@@ -30,7 +30,10 @@ def _parser() -> CommandParser:
     parser.add_argument("--baud", type=int, metavar="N", help="bits a second of the serial device (default 921600)")
     parser.add_argument("--listen", type=int, metavar="PORT", help="own UDP port (default: any)")
     parser.add_argument(
-        "--within", type=float, metavar="SHARE", help="share of the control cycle in which an answer counts (default 0.8)"
+        "--within",
+        type=float,
+        metavar="SHARE",
+        help="share of the control cycle in which an answer counts (default 0.8)",
     )
     parser.add_argument(
         "--hold", type=int, metavar="N",
