@@ -13,6 +13,7 @@ from css_drivers.text_line import (
     LineBuffer,
     LineError,
     LineFormat,
+    checksum,
     parse_line,
     usual_fields,
     write_line,
@@ -45,37 +46,33 @@ def test_fields_may_stand_in_any_order():
     assert parse_line(PLAIN, b" 2.5 ;whatever; -.5e-1") == CellLine(None, (-0.05, 2.5))
 
 
-@pytest.mark.parametrize(
-    ("line", "kind"),
-    [
-        (b"", "checksum"),
-        (b"$CSS,1,0.1,0.2,0.3", "checksum"),
-        (b"$CSS,1,0.1,0.2,0.3*ZZ", "checksum"),
-        (b"$CSS,1,0.1,0.2,0.3*00", "checksum"),
-        (b"$GPS,1,0.1,0.2,0.3*7B", "prefix"),
-        (b"\xff\xfe", "prefix"),
-    ],
-)
-def test_lines_that_are_none(line, kind):
-    with pytest.raises(LineError) as caught:
-        parse_line(USUAL, line)
-    assert caught.value.kind in (kind, "checksum")
+def summed(body):
+    """A line with its right checksum."""
+    return f"${body}*{checksum(body.encode()):02x}".encode()
 
 
 @pytest.mark.parametrize(
-    ("line", "kind"),
+    ("form", "line", "kind"),
     [
-        (b"1;2", "fields"),
-        (b"1;2;3;4", "fields"),
-        (b"x;2;3", "number"),
-        (b"0x1;2;3", "number"),
-        (b"1_0;2;3", "number"),
-        (b"1e999;2;3", "number"),
+        (USUAL, b"", "checksum"),
+        (USUAL, b"$CSS,1,0.1,0.2,0.3", "checksum"),
+        (USUAL, b"$CSS,1,0.1,0.2,0.3*ZZ", "checksum"),
+        (USUAL, b"$CSS,1,0.1,0.2,0.3*00", "checksum"),
+        (USUAL, summed("GPS,1,0.1,0.2,0.3"), "prefix"),
+        (USUAL, b"\xff\xfe", "prefix"),
+        (USUAL, summed("CSS,1,0.1,0.2"), "fields"),
+        (USUAL, summed("CSS,1,0.1,0.2,0.3,0.4"), "fields"),
+        (USUAL, summed("CSS,-1,0.1,0.2,0.3"), "number"),
+        (USUAL, summed("CSS,1,0.1,0.2,volts"), "number"),
+        (PLAIN, b"1;2", "fields"),
+        (PLAIN, b"0x1;2;3", "number"),
+        (PLAIN, b"1_0;2;3", "number"),
+        (PLAIN, b"1e999;2;3", "number"),
     ],
 )
-def test_plain_lines_that_are_none(line, kind):
+def test_lines_that_are_none(form, line, kind):
     with pytest.raises(LineError) as caught:
-        parse_line(PLAIN, line)
+        parse_line(form, line)
     assert caught.value.kind == kind
 
 
