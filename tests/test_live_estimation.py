@@ -70,8 +70,11 @@ class Flight:
         self.estimates = bench.listen("ekf/sun_estimate", SunEstimate)
         self.node = bench.host(kind, mission, "ekf")
 
-    def fly(self, cells, gyro, dark=(), late=0.0):
-        """Sends cells and gyro at times [s]; `dark` is when no cell sees anything, `late` how late the gyro comes."""
+    def fly(self, cells, gyro, dark=(), late=0.0, late_cells=()):
+        """Sends cells and gyro at times [s].
+
+        `dark` is when no cell sees anything, `late` how late the gyro comes, `late_cells` which cells come 0.25 s late.
+        """
         voltages = np.maximum(0.0, sun_b(cells) @ NORMALS.T)
         for begin, end in [dark] if dark else []:
             voltages[(cells > begin) & (cells < end)] = 0.0
@@ -81,7 +84,8 @@ class Flight:
         covariance = 1e-8 * np.eye(3).ravel()
         rates = {"angular_velocity": RATE, "angular_velocity_covariance": covariance}
         events += [(t + late, "gyro/imu", Imu, rates, "imu_link") for t in gyro]
-        for t, topic, kind, fields, frame in sorted(events, key=lambda event: event[0]):
+        arrival = [t + 0.25 * (k in late_cells) for k, (t, *_) in enumerate(events)]
+        for _, (t, topic, kind, fields, frame) in sorted(zip(arrival, events, strict=True), key=lambda pair: pair[0]):
             stamp = T0 + round((t - (late if kind is Imu else 0.0)) * 1e9)
             self.bench.publish(topic, kind, codec_of(kind).sample(stamp, frame, **fields))
             self.bench.executor.spin_once(timeout_sec=0.0)
@@ -118,6 +122,15 @@ def test_jitter_missing_and_late_messages_cost_little(flight, rng):
     counters = flight.node.health().counters
     assert counters["unmatched"] == 0
     assert not any("rejected" in key for key in counters)
+
+
+def test_cells_that_come_behind_later_ones_are_left_out_and_counted(flight, rng):
+    cells = jittered(rng, 0.1, 0.3, 30.0)
+    late = set(range(20, 280, 9))
+    estimates = flight.fly(cells, jittered(rng, 0.02, 0.3, 30.0), late_cells=late)
+    assert [e.stamp_ns for e in estimates] == [T0 + round(t * 1e9) for k, t in enumerate(cells) if k not in late]
+    assert flight.node.health().counters["cells.rejected.stamp_back"] == len(late)
+    assert np.max(flight.errors(after=10.0)) < 0.2
 
 
 def test_in_the_dark_the_direction_turns_by_the_time_between_stamps(flight, rng):

@@ -12,7 +12,7 @@ from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
 from css_bringup.options import complain, console
 from css_bringup.verbs.fly import conclude
-from css_common.command import FAILED, INTERRUPTED
+from css_common.command import FAILED
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.progress_lines import still_working
@@ -35,13 +35,13 @@ def run(arguments: argparse.Namespace) -> int:
         raise MissionError(f"{error}; expected the board's serial device or address") from error
     console.print(f"the board on {link.name} takes the place of {', '.join(replaced)}", soft_wrap=True)
     try:
-        refusal = _greeted(link, mission, values, arguments.wait)
+        answers = _answers(link, mission, values, arguments.wait)
     except BaseException:
         link.close()
         raise
-    if refusal is not None:
+    if not answers:
         link.close()
-        return refusal
+        return FAILED
     HilBridge.opened = link
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
     watch = _Watch(arguments.silence)
@@ -73,8 +73,8 @@ def _bridge_options(arguments: argparse.Namespace) -> dict[str, str]:
     return changes | ({} if arguments.listen is None else {"udp.listen": str(arguments.listen)})
 
 
-def _greeted(link: HilLink, mission: Mission, values: Values, wait: float) -> int | None:
-    """Waits until the board answers; the exit code when it does not."""
+def _answers(link: HilLink, mission: Mission, values: Values, wait: float) -> bool:
+    """Waits until the board answers; False, after a line that says why, when it does not."""
     wheels, rods = actuators(values)
     cells = (math.nan,) * len(values.cells.normals)
     none = (0.0, 0.0, 0.0)
@@ -82,17 +82,16 @@ def _greeted(link: HilLink, mission: Mission, values: Values, wait: float) -> in
     with StopSignal() as stop, still_working("waiting for the board"):
         exchange = greet(link, told, wheels, mission.epoch_ns - mission.period_ns, wait, lambda: stop.came)
     if stop.came:
-        complain("interrupted")
-        return INTERRUPTED
+        raise KeyboardInterrupt
     counts = exchange.counts
     if counts[ANSWERED]:
-        return None
+        return True
     reason = exchange.trouble or (
         f"{counts[SENT]} frames of version {VERSION} sent, {counts[CORRUPT]} damaged and {counts[WRONG]} wrong ones "
         f"came back; expected a command for {wheels} wheels and {rods} rods"
     )
     complain("hil: error:", f"no answer of the board on {link.name} within {wait:g} s: {reason}")
-    return FAILED
+    return False
 
 
 class _Watch:
