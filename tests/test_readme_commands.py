@@ -12,7 +12,7 @@ from css_analysis.commands import slit_analyse
 from css_bringup.commands import fly, replay
 from css_bringup.replay_bag import default_replay
 from css_common.command import USAGE
-from css_recording.commands import import_csv
+from css_telemetry.commands import import_csv
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("src/*/README.md"), *ROOT.glob("b*/README.md"))

@@ -8,11 +8,11 @@ from pathlib import Path
 from css_common.command import FAILED, USAGE, CommandParser, complain
 from css_common.epochs import parse_utc
 from css_recording.bag_folder import fresh_folder
-from css_recording.csv_import import ImportReport, import_telemetry, refuse_unscaled
+from css_telemetry.csv_import import ImportReport, import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
-from css_recording.layout_file import read_layout
-from css_recording.table_columns import likenesses
-from css_recording.telemetry_table import read_telemetry
+from css_telemetry.layout_file import read_layout
+from css_telemetry.table_columns import likenesses
+from css_telemetry.telemetry_table import read_telemetry
 
 
 def run(parser: CommandParser, options: argparse.Namespace) -> int:

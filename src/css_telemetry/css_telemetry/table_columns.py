@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from css_recording.errors import BagError
-from css_recording.layout_file import CellLayout
-from css_recording.table_forms import TIME_UNITS
-from css_recording.table_text import Line, TableText, name_and_unit
-from css_recording.table_values import plain_number
+from css_telemetry.layout_file import CellLayout
+from css_telemetry.table_forms import TIME_UNITS
+from css_telemetry.table_text import Line, TableText, name_and_unit
+from css_telemetry.table_values import plain_number
 
 Indices = tuple[int, int, int]
 

@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from css_recording.errors import BagError
-from css_recording.layout_file import CellLayout
-from css_recording.sentinels import fill_values
-from css_recording.table_columns import TIME_NAMES, Columns, Indices, identify_columns
-from css_recording.table_text import Line, TableText, read_table
-from css_recording.table_times import consistent_lines
-from css_recording.table_values import Broken, parse_number, parse_time
+from css_telemetry.layout_file import CellLayout
+from css_telemetry.sentinels import fill_values
+from css_telemetry.table_columns import TIME_NAMES, Columns, Indices, identify_columns
+from css_telemetry.table_text import Line, TableText, read_table
+from css_telemetry.table_times import consistent_lines
+from css_telemetry.table_values import Broken, parse_number, parse_time
 
 Vector = tuple[float, float, float]
 

@@ -7,7 +7,7 @@ from datetime import date, timedelta
 from decimal import Decimal
 
 from css_common.epochs import parse_utc
-from css_recording.table_forms import TIME_UNITS
+from css_telemetry.table_forms import TIME_UNITS
 
 _UNIT_NAMES = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import yaml
 
 from css_recording.errors import BagError
-from css_recording.table_values import plain_number
+from css_telemetry.table_values import plain_number
 
 MOST_CELLS = 32
 _CSV_HEADER = ["cell", "x", "y", "z"]

@@ -15,11 +15,11 @@ from css_common.mission_file import flattened, read_sections
 from css_common.schema import checked_values
 from css_common.shared_sections import shared_parameters
 from css_recording.bag_reader import BagReader
-from css_recording.commands.import_csv import main
-from css_recording.csv_import import import_telemetry, refuse_unscaled
+from css_telemetry.commands.import_csv import main
+from css_telemetry.csv_import import import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
-from css_recording.layout_file import CellLayout
-from css_recording.telemetry_table import read_telemetry
+from css_telemetry.layout_file import CellLayout
+from css_telemetry.telemetry_table import read_telemetry
 
 LAYOUT = CellLayout(("c1", "c2"), ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8)))
 EPOCH_NS = 1_370_044_800_000_000_000

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_recording.errors import BagError
-from css_recording.layout_file import CellLayout
-from css_recording.sentinels import fill_values
-from css_recording.table_columns import likenesses
-from css_recording.table_times import LONGEST_NS, consistent_lines
-from css_recording.telemetry_table import read_telemetry
+from css_telemetry.layout_file import CellLayout
+from css_telemetry.sentinels import fill_values
+from css_telemetry.table_columns import likenesses
+from css_telemetry.table_times import LONGEST_NS, consistent_lines
+from css_telemetry.telemetry_table import read_telemetry
 
 LAYOUT = CellLayout(("c1", "c2"), ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8)))
 BEGIN_NS = 1_700_000_000 * 10**9

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_recording.errors import BagError
-from css_recording.layout_file import CellLayout, read_layout
+from css_telemetry.layout_file import CellLayout, read_layout
 
 
 def layout(tmp_path, text, name="layout.yaml"):

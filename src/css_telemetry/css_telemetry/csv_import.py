@@ -24,9 +24,9 @@ from css_msgs.msg import CssVoltages, SpacecraftState
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
-from css_recording.layout_file import CellLayout
+from css_telemetry.layout_file import CellLayout
 from css_recording.provenance import software_versions
-from css_recording.telemetry_table import Telemetry, TelemetryRow
+from css_telemetry.telemetry_table import Telemetry, TelemetryRow
 
 BODY_FRAME = "bus"
 INERTIAL_FRAME = "eci"

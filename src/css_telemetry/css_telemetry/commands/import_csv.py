@@ -6,7 +6,7 @@ import sys
 from collections.abc import Sequence
 
 from css_common.command import CommandParser, command_parser, implementation
-from css_recording.table_forms import LAYOUT_FORM, TELEMETRY_FORM, TIME_UNITS
+from css_telemetry.table_forms import LAYOUT_FORM, TELEMETRY_FORM, TIME_UNITS
 
 _DESCRIPTION = f"""\
 Turn a CSV table of telemetry into a recording that replays like one of Sunpoint's own.
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     parser = _parser()
     options = parser.parse_args(arguments)
-    run = implementation("css_recording.verbs.import_csv")
+    run = implementation("css_telemetry.verbs.import_csv")
     return run(parser, options)
 
 
@@ -46,7 +46,7 @@ def _positive(text: str) -> float:
 
 
 def _parser() -> CommandParser:
-    parser = command_parser("css_recording", "import_csv", _DESCRIPTION, _EXAMPLES, _EXITS, _NOTES)
+    parser = command_parser("css_telemetry", "import_csv", _DESCRIPTION, _EXAMPLES, _EXITS, _NOTES)
     parser.add_argument("table", help="CSV file of telemetry")
     parser.add_argument("layout", help="YAML or CSV file of cell names and normals")
     parser.add_argument("-o", "--output", metavar="FOLDER", help="new recording (default: bags/NAME_TIME)")
