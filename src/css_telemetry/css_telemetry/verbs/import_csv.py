@@ -1,22 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reads a table of telemetry, writes the recording, and says what it is made of."""
+"""Reads a table of telemetry, writes the recording, and says what it is made of; or proposes a description."""
 
 import argparse
-from collections.abc import Iterator
+import json
+import sys
 from pathlib import Path
 
-from css_common.command import FAILED, USAGE, CommandParser, complain
+from css_common.command import DONE, FAILED, USAGE, CommandParser, complain
 from css_common.epochs import parse_utc
+from css_common.progress_lines import still_working
 from css_recording.bag_folder import fresh_folder
-from css_telemetry.csv_import import ImportReport, import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
-from css_telemetry.layout_file import read_layout
-from css_telemetry.table_columns import likenesses
-from css_telemetry.telemetry_table import read_telemetry
+from css_telemetry.description_file import read_description
+from css_telemetry.importing import ImportReport, examined, record
+from css_telemetry.summary import summary_lines, summary_object
+from css_telemetry.telemetry import read_telemetry, refuse_unscaled
 
 
 def run(parser: CommandParser, options: argparse.Namespace) -> int:
-    """Imports as the options say; the exit code."""
+    """Imports or describes as the options say; the exit code."""
+    if options.describe:
+        return _describe(parser, options)
     try:
         epoch_ns = None if options.epoch is None else parse_utc(options.epoch)
     except (ValueError, OverflowError) as error:
@@ -24,46 +28,68 @@ def run(parser: CommandParser, options: argparse.Namespace) -> int:
     source = Path(options.table)
     folder = Path(options.output) if options.output else fresh_folder(source.stem)
     try:
-        layout = read_layout(Path(options.layout))
-        telemetry = read_telemetry(source, layout, epoch_ns, options.full_scale, options.skip_bad, options.time_unit)
-        refuse_unscaled(telemetry, source)
+        with still_working(f"reading {source}"):
+            description = read_description(Path(options.layout))
+            telemetry = read_telemetry(
+                source,
+                description,
+                epoch_ns=epoch_ns,
+                full_scale=options.full_scale,
+                time_unit=options.time_unit,
+            )
+            refuse_unscaled(telemetry, source)
+            report = examined(telemetry, folder)
     except BagError as error:
         complain(parser.prog, error)
         return USAGE
     try:
-        report = import_telemetry(telemetry, layout, source, folder, overwrite=options.overwrite)
+        record(report, source, overwrite=options.overwrite)
     except BagError as error:
         complain(parser.prog, error)
         return FAILED
-    print("\n".join(_summary(report)))
-    return 0
+    print("\n".join(summary_lines(report)))
+    if options.json:
+        print(json.dumps(summary_object(report)))
+    return _verdict(parser, report, options.skip_bad)
 
 
-def _summary(report: ImportReport) -> Iterator[str]:
-    telemetry = report.telemetry
-    refused = sum(kind.lines for kind in telemetry.refused.values())
-    yield f"{report.recording}: {sum(report.messages.values())} messages, every {report.period_s:g} s"
-    yield from (f"  {count:9d}  {topic}" for topic, count in report.messages.items())
-    yield f"lines of telemetry: {telemetry.lines} read, {len(telemetry.rows)} used, {refused} refused"
-    for kind, found in telemetry.refused.items():
-        yield f"  refused ({kind}): {found.lines}, the first is line {found.first_line}"
-    counted = {
-        "lines used without any cell output": report.missing_lines,
-        "lines used without a rate": report.missing_rates,
-        "lines used without a Sun vector": report.missing_suns,
-        "missing cell outputs in the other lines": report.missing_cells,
-    }
-    yield from (f"{name}: {count}" for name, count in counted.items() if count)
-    for value, count in telemetry.fills.items():
-        yield f"taken for a missing value: {value:.10g}, {count} times"
-    if report.gaps:
-        yield f"gaps in time: {report.gaps}, the longest {report.longest_gap_s:g} s"
-    if telemetry.read_as:
-        yield f"read as: {', '.join(telemetry.read_as)}"
-    if telemetry.has_sun:
-        yield "truth: the Sun vector of the table, taken to be in the body frame; position, attitude, eclipse not known"
-    if telemetry.ignored_columns:
-        yield f"columns not used: {', '.join(telemetry.ignored_columns)}"
-        yield from (f"  {likeness}" for likeness in likenesses(telemetry.ignored_columns))
-    if not 0.5 <= report.largest_output <= 1.5:
-        yield f"the largest cell output is {report.largest_output:.3g}; 1 is the Sun met head-on, see --full-scale"
+def _verdict(parser: CommandParser, report: ImportReport, skip_bad: bool) -> int:
+    """Says what was not as it should be; the exit code knows it."""
+    wrong = []
+    account = report.telemetry.account
+    if not skip_bad and (account.refused or account.repaired):
+        counts = f"{account.refused_lines} lines refused, {account.repaired_values} values left out"
+        wrong.append(f"{counts} of {account.lines} lines; --skip-bad takes that as it is")
+    if report.sun is not None and report.sun.doubtful:
+        wrong.append(
+            f"the Sun of the truth is {report.sun.median_deg:.0f} deg (median) beside the one that the cells see: check "
+            "the order and direction of the attitude, the frame, the times, the normals"
+        )
+    for line in wrong:
+        complain(parser.prog, line, "not as it should be")
+    return FAILED if wrong else DONE
+
+
+def _describe(parser: CommandParser, options: argparse.Namespace) -> int:
+    from css_telemetry.proposal import proposed
+
+    source = Path(options.table)
+    try:
+        text = proposed(source)
+    except BagError as error:
+        complain(parser.prog, error)
+        return USAGE
+    if options.output is None:
+        sys.stdout.write(text)
+        return DONE
+    target = Path(options.output)
+    if target.exists() and not options.overwrite:
+        complain(parser.prog, f"{target} is there; --overwrite replaces it")
+        return USAGE
+    try:
+        target.write_text(text, encoding="utf-8")
+    except OSError as error:
+        complain(parser.prog, f"{target}: cannot be written: {error.strerror}")
+        return FAILED
+    print(f"{target}: correct what is marked with ?, then: import-csv {source} {target}")
+    return DONE
