@@ -11,7 +11,7 @@ from css_recording.errors import BagError
 from css_telemetry.clock import consistent_lines
 from css_telemetry.description import Description, PositionForm
 from css_telemetry.faults import Account, Broken, add
-from css_telemetry.header import check_header, column_of, long_form
+from css_telemetry.header import column_of, long_form
 from css_telemetry.instants import stamps_of
 from css_telemetry.sentinels import fill_values
 from css_telemetry.table_text import Block, Table
@@ -94,7 +94,6 @@ def read_columns(table: Table, description: Description) -> Readings:
     groups = groups_of(description)
     names = tuple(dict.fromkeys(name for group in groups for name in group.columns))
     try:
-        check_header(table)
         at = {name: _found(table, name) for name in (*description.time.columns, *names)}
     except ValueError as error:
         known = {cell.column for cell in description.cells}

@@ -55,7 +55,7 @@ def column_of(table: Table, name: str) -> int | None:
     return found[0] if found else None
 
 
-def check_header(table: Table) -> None:
+def _check_header(table: Table) -> None:
     """Raises ValueError when the first line names no columns, or one twice."""
     header = table.header
     if header and all(map(is_number, header)):
@@ -80,8 +80,9 @@ def completed(
         The description, and what was read by another name than its own.
 
     Raises:
-        ValueError: a column is missing, stands twice or has no unit.
+        ValueError: the first line names no columns; one is missing, stands twice or has no unit.
     """
+    _check_header(table)
     taken = {column_of(table, cell.column) for cell in description.cells}
     others = [index for index in range(len(table.header)) if index not in taken]
     notes: list[str] = []

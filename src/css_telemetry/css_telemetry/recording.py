@@ -116,8 +116,7 @@ def mission_text(
         entries["wheels.axes"] = [component for axis in wheels.axes_b for component in axis]
         if wheels.inertia is not None:
             entries["wheels.inertia"] = wheels.inertia
-    # photodiodes, no slits
-    return dump_sections({"/**": entries, "triad": {"sun_source": "cells"}})
+    return dump_sections({"/**": entries})
 
 
 def _temperature_topic(name: str) -> Topic:

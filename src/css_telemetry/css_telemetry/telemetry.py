@@ -13,7 +13,7 @@ from css_telemetry.cell_outputs import cell_outputs
 from css_telemetry.columns import Readings, read_columns
 from css_telemetry.description import Description
 from css_telemetry.faults import Account, Counted
-from css_telemetry.header import completed
+from css_telemetry.header import column_of, completed, long_form
 from css_telemetry.motion import attitudes_of, directions_of, vectors_of
 from css_telemetry.places import Place, place_of
 from css_telemetry.table_files import open_table
@@ -120,7 +120,10 @@ def read_telemetry(
     try:
         description, notes = completed(table, description, time_unit, epoch_ns)
     except ValueError as error:
-        raise BagError(f"{path}: line {table.header_line}: {error}{_pivot(table, description)}") from error
+        pivot = long_form(table, {cell.column for cell in description.cells})
+        raise BagError(f"{path}: line {table.header_line}: {error}{pivot}") from error
+    if full_scale is None and not description.scaled:
+        _refuse_different_units(table, description)
     readings = read_columns(table, description)
     return _telemetry(readings, description, full_scale, table, notes, hashlib.sha256(content).hexdigest())
 
@@ -132,10 +135,16 @@ def open_described(path: Path, content: bytes, description: Description) -> Tabl
     return open_table(path, content, names | set(times), description.table, times)
 
 
-def _pivot(table: Table, description: Description) -> str:
-    from css_telemetry.header import long_form
-
-    return long_form(table, {cell.column for cell in description.cells})
+def _refuse_different_units(table: Table, description: Description) -> None:
+    """Cells in different units need a full scale each, by which they are one again."""
+    places = [column_of(table, cell.column) for cell in description.cells]
+    units = {table.units[index]: index for index in places if index is not None}
+    if len(units) > 1:
+        first, second = (table.header[index] for index in list(units.values())[:2])
+        raise BagError(
+            f"{table.path}: line {table.header_line}: the cells {first} and {second} have different units, expected one, "
+            "or a full scale for each"
+        )
 
 
 def _telemetry(
@@ -150,7 +159,7 @@ def _telemetry(
     units = {
         unit: None
         for cell in description.cells
-        if (unit := cell.unit or table.units[_index(table, cell.column)]) not in ("", "1")
+        if (unit := cell.unit or _unit_of(table, cell.column)) not in ("", "1")
     }
     telemetry = Telemetry(
         description,
@@ -176,12 +185,9 @@ def _telemetry(
     return telemetry
 
 
-def _index(table: Table, name: str) -> int:
-    from css_telemetry.header import column_of
-
+def _unit_of(table: Table, name: str) -> str:
     index = column_of(table, name)
-    assert index is not None  # it was read
-    return index
+    return "" if index is None else table.units[index]
 
 
 def _truth(readings: Readings, description: Description) -> TrueMotion:

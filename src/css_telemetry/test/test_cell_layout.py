@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_recording.errors import BagError
-from css_telemetry.layout_file import CellLayout, read_layout
+from css_telemetry.description import CellForm, Description
+from css_telemetry.description_file import read_description
 
 
 def layout(tmp_path, text, name="layout.yaml"):
@@ -18,19 +19,27 @@ def layout(tmp_path, text, name="layout.yaml"):
     return path
 
 
+def names_of(found):
+    return tuple(cell.name for cell in found.cells)
+
+
+def normals_of(found):
+    return [cell.normal_b for cell in found.cells]
+
+
 def test_layouts_in_both_forms(tmp_path):
     text = """\
         cells: {CSS 1: [0.71, 0, 0.71], 2: [0, 0, -1]}
         field_of_view_deg: 100
         clip_normal: [0, 0, 1]
     """
-    found = read_layout(layout(tmp_path, text))
-    assert found.names == ("CSS 1", "2")
-    np.testing.assert_allclose(found.normals_b, [(0.5**0.5, 0, 0.5**0.5), (0, 0, -1)], rtol=1e-15)
+    found = read_description(layout(tmp_path, text))
+    assert names_of(found) == ("CSS 1", "2")
+    np.testing.assert_allclose(normals_of(found), [(0.5**0.5, 0, 0.5**0.5), (0, 0, -1)], rtol=1e-15)
     assert found.field_of_view_deg == 100.0
     assert found.clip_normal_b == (0.0, 0.0, 1.0)
-    found = read_layout(layout(tmp_path, "cell,x,y,z\nA, 1, 0, 0\nB,0,0,-1\n", "layout.csv"))
-    assert found == CellLayout(("A", "B"), ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0)))
+    found = read_description(layout(tmp_path, "cell,x,y,z\nA, 1, 0, 0\nB,0,0,-1\n", "layout.csv"))
+    assert found == Description((CellForm("A", "A", (1.0, 0.0, 0.0)), CellForm("B", "B", (0.0, 0.0, -1.0))))
 
 
 @pytest.mark.parametrize(
@@ -41,7 +50,7 @@ def test_layouts_in_both_forms(tmp_path):
         ("cells: 3", "expected the key cells"),
         ("cells: {}", "0 cells given"),
         ("cells: {a: [1, 0]}", "cell a: .* expected a unit vector"),
-        ("cells: {a: [1, 1, 0]}", "cell a: a normal of length 1.414"),
+        ("cells: {a: [1, 1, 0]}", "cell a: a vector of length 1.414"),
         ("cells: {a: [1, 0, x]}", "cell a: 'x' given, expected a number"),
         ("cells: {a: [1, 0, true]}", "cell a: 'true' given"),
         ("cells: {a: [.nan, 0, 1]}", "cell a: '.nan' given"),
@@ -53,7 +62,7 @@ def test_layouts_in_both_forms(tmp_path):
         ("cells: {'': [1, 0, 0]}", "a cell has no name"),
         ("cells: {? [a] : [1, 0, 0]}", "line 1: expected a word as key"),
         ("cells: " + 3000 * "[", "not valid YAML"),
-        ("cells: {a: [1, 0, 0]}\nfull_scale: 0", "full_scale: 0 given, expected a number above 0"),
+        ("cells: {a: [1, 0, 0]}\nfull_scale: 0", "full_scale: '0' given, expected a number above 0"),
         ("cells: {a: [1, 0, 0]}\nfull_scale: {b: 1}", "full_scale: a is not in both"),
         ("cells: {a: [1, 0, 0]}\ndark_level: high", "dark_level: 'high' given"),
         ("cells: {a: north}", "cell a: 'north' given"),
@@ -66,7 +75,7 @@ def test_layouts_in_both_forms(tmp_path):
 )
 def test_broken_layouts_are_refused(tmp_path, text, words):
     with pytest.raises(BagError, match=words):
-        read_layout(layout(tmp_path, text))
+        read_description(layout(tmp_path, text))
 
 
 @pytest.mark.parametrize(
@@ -82,7 +91,7 @@ def test_broken_layouts_are_refused(tmp_path, text, words):
 )
 def test_broken_layout_tables_are_refused(tmp_path, text, words):
     with pytest.raises(BagError, match=words):
-        read_layout(layout(tmp_path, text, "layout.csv"))
+        read_description(layout(tmp_path, text, "layout.csv"))
 
 
 def test_names_are_what_stands_there(tmp_path):
@@ -95,9 +104,9 @@ def test_names_are_what_stands_there(tmp_path):
           01: [0, 0, -1]
           0x1: [0, -1, 0]
     """
-    found = read_layout(layout(tmp_path, text))
-    assert found.names == ("+X", "-X", "on", "1", "01", "0x1")
-    assert found.normals_b[2] == (0.0, 1.0, 0.0)
+    found = read_description(layout(tmp_path, text))
+    assert names_of(found) == ("+X", "-X", "on", "1", "01", "0x1")
+    assert normals_of(found)[2] == (0.0, 1.0, 0.0)
 
 
 def test_scale_and_dark_level_of_all_or_of_each_cell(tmp_path):
@@ -106,16 +115,16 @@ def test_scale_and_dark_level_of_all_or_of_each_cell(tmp_path):
         full_scale: 3000
         dark_level: {b: 90, a: 100.5}
     """
-    found = read_layout(layout(tmp_path, text))
-    assert found.full_scale == (3000.0, 3000.0)
-    assert found.dark_level == (100.5, 90.0)
+    found = read_description(layout(tmp_path, text))
+    assert [cell.full_scale for cell in found.cells] == [3000.0, 3000.0] and found.scaled
+    assert [cell.dark_level for cell in found.cells] == [100.5, 90.0]
 
 
 def test_folders_and_rubbish_are_refused(tmp_path):
     (tmp_path / "rubbish.yaml").write_bytes(bytes(range(256)))
     for path in (tmp_path, tmp_path / "nowhere.yaml", tmp_path / "rubbish.yaml"):
         with pytest.raises(BagError, match="cannot be read"):
-            read_layout(path)
+            read_description(path)
 
 
 @settings(max_examples=200, deadline=None)
@@ -126,8 +135,8 @@ def test_no_text_makes_the_reader_crash(tmp_path_factory, text, suffix):
     path = tmp_path_factory.mktemp("garbage") / f"layout{suffix}"
     path.write_text("cells: {a: [1, 0, 0]}\n" * (suffix == ".yaml") + text, encoding="utf-8", errors="replace")
     try:
-        found = read_layout(path)
+        found = read_description(path)
     except BagError as error:
         assert str(error).startswith(f"{path}: ") and "\n" not in str(error)
     else:
-        np.testing.assert_allclose(np.linalg.norm(found.normals_b, axis=1), 1.0, rtol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(normals_of(found), axis=1), 1.0, rtol=1e-12)

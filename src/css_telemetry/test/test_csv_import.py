@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A table of telemetry becomes the recording that it describes, or is refused by line and column."""
 
+import json
 import math
 import textwrap
 
@@ -16,12 +17,12 @@ from css_common.schema import checked_values
 from css_common.shared_sections import shared_parameters
 from css_recording.bag_reader import BagReader
 from css_telemetry.commands.import_csv import main
-from css_telemetry.csv_import import import_telemetry, refuse_unscaled
 from css_recording.errors import BagError
-from css_telemetry.layout_file import CellLayout
-from css_telemetry.telemetry_table import read_telemetry
+from css_telemetry.description import CellForm, Description
+from css_telemetry.importing import examined, record
+from css_telemetry.telemetry import read_telemetry, refuse_unscaled
 
-LAYOUT = CellLayout(("c1", "c2"), ((1.0, 0.0, 0.0), (0.0, 0.6, 0.8)))
+LAYOUT = Description((CellForm("c1", "c1", (1.0, 0.0, 0.0)), CellForm("c2", "c2", (0.0, 0.6, 0.8))))
 EPOCH_NS = 1_370_044_800_000_000_000
 TABLE = """\
     # flight 7, morning pass
@@ -41,7 +42,9 @@ def table(tmp_path, text):
 
 
 def imported(path, folder, layout=LAYOUT, **options):
-    return import_telemetry(read_telemetry(path, layout, **options), layout, path, folder)
+    report = examined(read_telemetry(path, layout, **options), folder)
+    record(report, path)
+    return report
 
 
 def decoded(folder):
@@ -78,10 +81,16 @@ def test_values_units_and_gaps_as_other_readers_see_them(tmp_path, doctor):
     assert {m.header.frame_id for m in imu} == {"bus"}
 
     assert report.messages == {"/truth": 3, "/css/voltages": 3, "/gyro/imu": 4}
-    assert (report.missing_cells, report.missing_lines, report.missing_rates, report.gaps) == (1, 1, 1, 1)
-    assert report.period_s == 0.1
-    assert report.largest_output == 1.0
-    assert (report.missing_suns, report.longest_gap_s) == (1, 0.8)
+    missing = {what: (found.count, found.first_line) for what, found in report.telemetry.account.missing.items()}
+    assert missing == {
+        "missing cell outputs in the other lines": (1, 5),
+        "lines used without any cell output": (1, 6),
+        "lines used without a rate": (1, 5),
+        "lines used without a Sun vector": (1, 6),
+    }
+    assert (report.gaps, report.longest_gap_s, report.period_s) == (1, 0.8, 0.1)
+    assert report.telemetry.largest_output == 1.0
+    assert report.states.known == ("sun",)  # a line with the Sun has no rate
     assert report.telemetry.ignored_columns == ("temperature",)
     assert report.telemetry.read_as == ("separator semicolon",)
     assert not any(np.any(m.r_n) or np.any(m.v_n) or np.any(m.field_n) for m in truth)  # not known
@@ -110,13 +119,13 @@ def test_columns_that_are_not_there_make_no_topics(tmp_path):
 
 def test_seconds_count_exactly_from_the_epoch(tmp_path):
     text = "time,c1,c2\n0.1,1,2\n0.30000000000000004,1,2\n123456.123456789,3,4\n"
-    rows = read_telemetry(table(tmp_path, text), LAYOUT, epoch_ns=EPOCH_NS).rows
-    assert [row.stamp_ns - EPOCH_NS for row in rows] == [100_000_000, 300_000_000, 123_456_123_456_789]
+    stamps = read_telemetry(table(tmp_path, text), LAYOUT, epoch_ns=EPOCH_NS).stamps_ns
+    assert (stamps - EPOCH_NS).tolist() == [100_000_000, 300_000_000, 123_456_123_456_789]
 
 
 def test_outputs_are_divided_by_full_scale(tmp_path):
     path = table(tmp_path, "time,c1,c2\n1370000000,1.5,3\n")
-    assert read_telemetry(path, LAYOUT, full_scale=3.0).rows[0].cells == (0.5, 1.0)
+    assert read_telemetry(path, LAYOUT, full_scale=3.0).cells.tolist() == [[0.5, 1.0]]
 
 
 @pytest.mark.parametrize("unit", ["rad_s", "rad/s", "[rad/s]", "rad_per_s", "(rad/s)"])
@@ -124,59 +133,82 @@ def test_outputs_are_divided_by_full_scale(tmp_path):
 def test_names_of_rate_columns(tmp_path, name, unit):
     stem, *frame = name.split("_")
     columns = ",".join("_".join([stem, axis, *frame, unit]) for axis in "XYz")
-    rows = read_telemetry(table(tmp_path, f"time,c1,c2,{columns}\n1370000000,1,1,1,2,3\n"), LAYOUT).rows
-    assert rows[0].omega_bn_b == (1.0, 2.0, 3.0)
+    telemetry = read_telemetry(table(tmp_path, f"time,c1,c2,{columns}\n1370000000,1,1,1,2,3\n"), LAYOUT)
+    assert telemetry.rate.tolist() == [[1.0, 2.0, 3.0]]
 
 
 HEADER = "time,c1,c2,omega_x_rad_s,omega_y_rad_s,omega_z_rad_s,sun_x,sun_y,sun_z\n"
 GOOD = "1370000000,1,1,0,0,0,1,0,0\n"
 
 
-@pytest.mark.parametrize(
-    ("line", "words", "kind"),
-    [
-        ("1370000001,1,1,0,0,0,1,0", "expected 9 fields, found 8", "wrong number of fields"),
-        ("1370000001,1,1,0,0,0,1,0,0,7", "expected 9 fields, found 10", "wrong number of fields"),
-        ("yesterday,1,1,0,0,0,1,0,0", "column time: 'yesterday' found, expected seconds or an instant", "no time"),
-        (",1,1,0,0,0,1,0,0", "column time: '' found", "no time"),
-        ("nan,1,1,0,0,0,1,0,0", "column time: 'nan' found", "no time"),
-        ("1e400,1,1,0,0,0,1,0,0", "column time: '1e400' found", "no time"),
-        ("9999999999,1,1,0,0,0,1,0,0", "outside of 1970 to 2038", "no time"),
-        ("1e999999999,1,1,0,0,0,1,0,0", "column time: '1e999999999' found", "no time"),
-        ("17_00000000,1,1,0,0,0,1,0,0", "column time: '17_00000000' found", "no time"),
-        ("2024-366T00:00:61,1,1,0,0,0,1,0,0", "column time: '2024-366T00:00:61' found", "no time"),
-        ("2023-366T00:00:00,1,1,0,0,0,1,0,0", "column time: '2023-366T00:00:00' found", "no time"),
-        ("1370000001,0x10,1,0,0,0,1,0,0", "column c1: '0x10' found", "no number"),
-        ("1370000001,1_0,1,0,0,0,1,0,0", "column c1: '1_0' found", "no number"),
-        ('1370000001,"1,1,0,0,0,1,0,0', "a quotation mark is left open", "not readable"),
-        ("1370000000000,1,1,0,0,0,1,0,0", "is a time since 1970 in ms: --time-unit ms", "no time"),
-        ("12.5,1,1,0,0,0,1,0,0", "12.5 s is not a time since 1970; --epoch names its beginning", "no epoch"),
-        ("1370000000,1,1,0,0,0,1,0,0", "column time: it does not go forward", "does not go forward"),
-        ("1370000001,1,high,0,0,0,1,0,0", "column c2: 'high' found, expected a number", "no number"),
-        ('1370000001,1,"0,5",0,0,0,1,0,0', "column c2: '0,5' found, expected a number", "no number"),
-        ("1370000001,1,inf,0,0,0,1,0,0", "column c2: 'inf' found", "no number"),
-        ("1370000001,1,1,0,0,x,1,0,0", "column omega_z_rad_s: 'x' found", "no number"),
-        ("1370000001,1,1,0,0,0,0,0,0", "columns sun_x, sun_y, sun_z: expected a direction", "no direction"),
-    ],
-)
-def test_a_broken_line_is_named_or_left_out_and_counted(tmp_path, line, words, kind):
+REFUSED = [
+    ("1370000001,1,1,0,0,0,1,0", "expected 9 fields, found 8", "wrong number of fields"),
+    ("1370000001,1,1,0,0,0,1,0,0,7", "expected 9 fields, found 10", "wrong number of fields"),
+    ("yesterday,1,1,0,0,0,1,0,0", "column time: 'yesterday' found, expected seconds or an instant", "no time"),
+    (",1,1,0,0,0,1,0,0", "column time: '' found", "no time"),
+    ("nan,1,1,0,0,0,1,0,0", "column time: 'nan' found", "no time"),
+    ("1e400,1,1,0,0,0,1,0,0", "column time: '1e400' found", "no time"),
+    ("9999999999,1,1,0,0,0,1,0,0", "outside of 1970 to 2038", "no time"),
+    ("1e999999999,1,1,0,0,0,1,0,0", "column time: '1e999999999' found", "no time"),
+    ("17_00000000,1,1,0,0,0,1,0,0", "column time: '17_00000000' found", "no time"),
+    ("2024-366T00:00:61,1,1,0,0,0,1,0,0", "column time: '2024-366T00:00:61' found", "no time"),
+    ("2023-366T00:00:00,1,1,0,0,0,1,0,0", "column time: '2023-366T00:00:00' found", "no time"),
+    ('1370000001,"1,1,0,0,0,1,0,0', "a quotation mark is left open", "not readable"),
+    ("1370000000000,1,1,0,0,0,1,0,0", "is a time since 1970 in ms: --time-unit ms", "no time"),
+    ("12.5,1,1,0,0,0,1,0,0", "12.5 s is not a time since 1970; --epoch, or time: epoch, names its beginning", "no epoch"),
+    ("1370000000,1,1,0,0,0,1,0,0", "column time: it does not go forward", "does not go forward"),
+]
+LEFT_OUT = [
+    ("1370000001,0x10,1,0,0,0,1,0,0", "column c1: '0x10' found", "no number"),
+    ("1370000001,1_0,1,0,0,0,1,0,0", "column c1: '1_0' found", "no number"),
+    ("1370000001,1,high,0,0,0,1,0,0", "column c2: 'high' found, expected a number", "no number"),
+    ('1370000001,1,"0,5",0,0,0,1,0,0', "column c2: '0,5' found, expected a number", "no number"),
+    ("1370000001,1,inf,0,0,0,1,0,0", "column c2: 'inf' found", "no number"),
+    ("1370000001,1,1,0,0,x,1,0,0", "column omega_z_rad_s: 'x' found", "no number"),
+    ("1370000001,1,1,0,0,0,0,0,0", "columns sun_x, sun_y, sun_z: expected a direction", "no direction"),
+]
+
+
+@pytest.mark.parametrize(("line", "words", "kind"), [*REFUSED, *LEFT_OUT])
+def test_a_value_that_cannot_be_read_costs_itself_a_time_its_line(tmp_path, line, words, kind):
     path = table(tmp_path, HEADER + GOOD + "\n" + line + "\n1370000002,1,1,0,0,0,1,0,0\n")
+    telemetry = read_telemetry(path, LAYOUT)
+    account = telemetry.account
+    refused = (line, words, kind) in REFUSED
+    assert account.lines == 3 and len(telemetry.stamps_ns) == 3 - refused == 3 - account.refused_lines
+    counts, others = (account.refused, account.repaired) if refused else (account.repaired, account.refused)
+    ((found, counted),) = counts.items()
+    assert kind in found and words in counted.detail and (counted.count, counted.first_line) == (1, 4)
+    assert others == {}
+
+
+@pytest.mark.parametrize(("line", "words", "kind"), REFUSED)
+def test_a_table_of_which_no_line_can_be_used_is_refused_by_the_first(tmp_path, line, words, kind):
+    if kind == "does not go forward":
+        return
+    path = table(tmp_path, HEADER + line + "\n")
     with pytest.raises(BagError) as refusal:
         read_telemetry(path, LAYOUT)
-    assert str(refusal.value).startswith(f"{path}: line 4: ")
-    assert words in str(refusal.value)
-    assert str(refusal.value).endswith("(1 of 3 lines are broken; --skip-bad leaves them out)")
-    telemetry = read_telemetry(path, LAYOUT, skip_bad=True)
-    assert len(telemetry.rows) == 2 and telemetry.lines == 3
-    ((found, refused),) = telemetry.refused.items()
-    assert kind in found and refused == (1, 4)
+    assert str(refusal.value).startswith(f"{path}: line 2: ") and words in str(refusal.value)
+
+
+def test_what_a_bad_value_costs(tmp_path):
+    text = HEADER + GOOD + "1370000001,x,1,0,y,0,0,0,0\n1370000002,1,1,0,0,0,1,0,0\n"
+    telemetry = read_telemetry(table(tmp_path, text), LAYOUT)
+    np.testing.assert_array_equal(telemetry.cells, [[1, 1], [math.nan, 1], [1, 1]])
+    assert np.isfinite(telemetry.rate).all(axis=1).tolist() == [True, False, True]
+    assert np.isfinite(telemetry.truth.sun_b).all(axis=1).tolist() == [True, False, True]
+    assert {kind: (c.count, c.first_line) for kind, c in telemetry.account.repaired.items()} == {
+        "no number": (2, 3),
+        "no direction": (1, 3),
+    }
 
 
 @pytest.mark.parametrize(
     ("header", "words"),
     [
         ("t,c1,c2", "no column time; the header is t, c1, c2"),
-        ("time,c1", "no column c2, which the cell layout names"),
+        ("time,c1", "no column c2, which the description names"),
         ("time,c1,c2,c1", "two columns are called c1"),
         ("time,c1,c2,omega_x,omega_y,omega_z", "column omega_x: expected its unit"),
         ("time,c1,c2,omega_x_rad_s", "no column omega_y"),
@@ -244,18 +276,18 @@ def test_any_table_comes_out_as_it_went_in(tmp_path_factory, lines, delimiter):
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.text(max_size=200) | st.text("time,c1c2;\n\t0123456789.-\"'#", max_size=200), st.booleans())
-def test_no_text_makes_the_reader_crash(tmp_path_factory, text, skip_bad):
+@given(st.text(max_size=200) | st.text("time,c1c2;\n\t0123456789.-\"'#", max_size=200))
+def test_no_text_makes_the_reader_crash(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("garbage") / "table.csv"
     path.write_text("time,c1,c2\n1370000000,1,1\n" + text, encoding="utf-8", errors="replace", newline="")
     try:
-        telemetry = read_telemetry(path, LAYOUT, skip_bad=skip_bad)
+        telemetry = read_telemetry(path, LAYOUT)
     except BagError as error:
         assert str(path) in str(error)
     else:
-        stamps = [row.stamp_ns for row in telemetry.rows]
+        stamps = telemetry.stamps_ns.tolist()
         assert stamps == sorted(set(stamps))
-        assert len(stamps) + sum(kind.lines for kind in telemetry.refused.values()) == telemetry.lines
+        assert len(stamps) + telemetry.account.refused_lines == telemetry.account.lines
 
 
 def layout(tmp_path, text):
@@ -268,20 +300,24 @@ def test_command(tmp_path, capsys):
     cells = str(layout(tmp_path, "cells: {c1: [1, 0, 0], c2: [0, 0.6, 0.8]}"))
     flight = str(table(tmp_path, "time,c1,c2,mode\n0,2,1,a\n1,oops,1,b\n2,1,,c\n"))
     bag = str(tmp_path / "bag")
-    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01"]) == 2
-    refusal = capsys.readouterr().err
-    assert "error: " in refusal and "line 3: column c1: 'oops' found" in refusal
-    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01", "--skip-bad"]) == 0
-    printed = capsys.readouterr().out
+    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01"]) == 1
+    complaint = capsys.readouterr().err
+    assert "1 values left out of 3 lines; --skip-bad takes that as it is" in complaint
+    assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01", "--skip-bad", "--overwrite", "--json"]) == 0
+    *printed, last = capsys.readouterr().out.splitlines()
     for words in (
-        "2 messages, every 2 s",
-        "lines of telemetry: 3 read, 2 used, 1 refused",
-        "refused (no number): 1, the first is line 3",
-        "missing cell outputs in the other lines: 1",
+        "3 messages, every 1 s",
+        "time (UTC): 2013-06-01T00:00:00Z to 2013-06-01T00:00:02Z, 2 s",
+        "lines of telemetry: 3 read, 3 used, 0 refused, 1 values left out",
+        "values left out (no number): 1, the first is line 3: column c1: 'oops' found, expected a number",
+        "missing cell outputs in the other lines: 2, the first in line 3",
         "columns not used: mode",
         "--full-scale",
     ):
-        assert words in printed
+        assert words in "\n".join(printed)
+    told = json.loads(last)
+    assert told["lines"] == {"read": 3, "used": 3, "refused": 0} and told["span_s"] == 2.0
+    assert told["repaired"] == [{"kind": "no number", "count": 1, "first_line": 3}]
     assert main([flight, cells, "-o", bag, "--epoch", "2013-06-01", "--skip-bad"]) == 1
     assert "not empty" in capsys.readouterr().err
     for wrong in (["--epoch", "soon"], ["--full-scale", "0"], ["--time-unit", "days"], ["--nonsense"]):

@@ -27,8 +27,16 @@ _PRIMARY = choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; 
 
 
 _SUN_SOURCE = choice(
-    "sun_source", "slits", ("slits", "cells"), "what sees the Sun: slits at each passage, or the lit cells at each stamp"
+    "sun_source",
+    "auto",
+    ("auto", "slits", "cells"),
+    "what sees the Sun: slits at each passage, or the lit cells at each stamp; auto: cells where the mission has some",
 )
+
+
+def _is_by_cells(values: Values) -> bool:
+    source = values[_SUN_SOURCE]
+    return source == "cells" or (source == "auto" and len(values.cells.normals) > 0)
 
 
 class _Sighting(NamedTuple):
@@ -47,7 +55,7 @@ class _FieldSample(NamedTuple):
 class Triad(Component):
     """Attitude at each passage of the Sun, from its direction and the field at the same instant (TRIAD).
 
-    With `sun_source: cells` it is that of each stamp at which lit cells tell the Sun. Of slits the field is interpolated between samples, so an attitude goes out two samples after its instant: it is that of
+    Of cells it is that of each stamp at which lit cells tell the Sun. Of slits the field is interpolated between samples, so an attitude goes out two samples after its instant: it is that of
     `delay` before the stamp. References are the Sun's ephemeris and IGRF at the flight's position.
     """
 
@@ -56,8 +64,7 @@ class Triad(Component):
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
-        by_cells = values[_SUN_SOURCE] == "cells"
-        sun = cells_input(values) if by_cells else Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle)
+        sun = cells_input(values) if _is_by_cells(values) else Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle)
         return (sun, field_input(values, required=True))
 
     @classmethod
@@ -66,13 +73,13 @@ class Triad(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        cells = ("cells.normals",) if values[_SUN_SOURCE] == "cells" else ()
+        cells = ("cells.normals",) if _is_by_cells(values) else ()
         return (*cells, *needed_of_orbit(values))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         sampling = values.mission.period * values.magnetometer.divider
-        if values[_SUN_SOURCE] == "slits" and sampling > 0.05:
+        if not _is_by_cells(values) and sampling > 0.05:
             yield (
                 f"magnetometer.divider: a sample every {sampling:g} s given, expected at most 0.05 s: the field of a "
                 "spinning body is interpolated"
@@ -88,7 +95,7 @@ class Triad(Component):
         self._sightings: deque[_Sighting] = deque(maxlen=64)
         self._newest: dict[str, Any] | None = None
         self._instant_ns = 0
-        self._cell_sun = cell_sun.CellSun(self.values) if self.values[_SUN_SOURCE] == "cells" else None
+        self._cell_sun = cell_sun.CellSun(self.values) if _is_by_cells(self.values) else None
         self._attitude = typed_call(sun_field_attitude.sun_field_attitude)
         self._interpolated = typed_call(sun_field_attitude.interpolated_field)
         self._variance = typed_call(sun_field_attitude.interpolated_variance)
