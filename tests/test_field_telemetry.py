@@ -184,7 +184,11 @@ def test_latin_1_is_read_and_lines_with_a_field_too_few_are_not(tmp_path, capsys
     [
         ("42_mA.csv", "layout.yaml", "the largest cell output is 0.00217, expected about 1"),
         ("12_counts.csv", "layout.yaml", "the largest cell output is 2.7e+03, expected about 1"),
-        ("04_unix_ms.csv", "layout.yaml", "line 2: column time: 1700000000000 is outside of 1970 to 2038; it is a time"),
+        (
+            "04_unix_ms.csv",
+            "layout.yaml",
+            "line 2: column time: 1700000000000 is outside of 1970 to 2038; it is a time",
+        ),
         ("29_long.csv", "layout.yaml", "it has a line for each cell and time"),
         ("one_cell.csv", "lay_dup.yaml", "lay_dup.yaml: line 3: A stands twice"),
         ("one_cell.csv", "lay_facename.yaml", "no column +X, which the description names"),
@@ -219,7 +223,9 @@ def test_the_proposed_description_reads_what_the_layout_does(name, tmp_path, cap
     assert main([str(FIELD / f"{name}.csv"), "--describe", "-o", str(proposal)]) == 0
     capsys.readouterr()
     by_layout = imported(f"{name}.csv", tmp_path, capsys, *READ[name][0])[2]
-    cells, truth = (samples(by_layout, *topic) for topic in (("/css/voltages", CssVoltages), ("/truth", SpacecraftState)))
+    cells, truth = (
+        samples(by_layout, *topic) for topic in (("/css/voltages", CssVoltages), ("/truth", SpacecraftState))
+    )
     by_proposal = imported(f"{name}.csv", tmp_path, capsys, "--overwrite", text=proposal.read_text())[2]
     for old, new in zip(cells, samples(by_proposal, "/css/voltages", CssVoltages), strict=True):
         assert old.stamp_ns == new.stamp_ns

@@ -7,6 +7,7 @@ the clock that was set, what stands alone is a damaged time.
 
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,7 +23,7 @@ FAR_NS = 86_400 * 10**9
 _TIMES_THE_USUAL = 1000.0
 
 
-def consistent_lines(stamps_ns: Sequence[int]) -> np.ndarray:
+def consistent_lines(stamps_ns: Sequence[int] | np.ndarray) -> np.ndarray:
     """Indices of the largest set of times that grow from line to line, without those that stand alone far off.
 
     A clock that was set back costs the shorter of the two stretches, a damaged time itself alone. Of a time that
@@ -71,6 +72,6 @@ def _without_strays(stamps: np.ndarray, kept: np.ndarray) -> np.ndarray:
     steps = np.diff(stamps[kept])
     far = max(float(FAR_NS), _TIMES_THE_USUAL * float(np.median(steps)))
     ends = np.concatenate(([0], np.flatnonzero(steps > far) + 1, [len(kept)]))
-    parts = list(zip(ends[:-1], ends[1:], strict=True))
+    parts = list(pairwise(ends.tolist()))
     believed = [kept[first:end] for first, end in parts if end - first >= CONFIRMED_BY]
     return np.concatenate(believed) if believed else kept

@@ -133,7 +133,7 @@ def _read(
 ) -> _Part:
     time = description.time
     assert time is not None
-    account.lines += block.count
+    account.lines += block.size
     for number, fault in block.broken:
         account.refuse(number, fault)
     stamps, faults = stamps_of([block.columns[at[name]] for name in time.columns], time, table.decimal_comma)

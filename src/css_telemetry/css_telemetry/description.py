@@ -23,6 +23,10 @@ class TableForm(NamedTuple):
     long_value: str = ""
 
 
+PLAIN = TableForm()
+"""A table of which nothing is told."""
+
+
 class TimeForm(NamedTuple):
     """What the times of a table are."""
 
@@ -126,7 +130,7 @@ class Description(NamedTuple):
     cells: tuple[CellForm, ...]
     field_of_view_deg: float = 120.0
     clip_normal_b: Triple = (0.0, 0.0, 0.0)
-    table: TableForm = TableForm()
+    table: TableForm = PLAIN
     time: TimeForm | None = None  # None: by the header
     missing: tuple[float, ...] | None = None  # numbers that stand for missing values; None: found
     aiding: Aiding | None = None

@@ -2,6 +2,7 @@
 """Reads a description of a table of telemetry, or the layout of its cells alone (forms: `table_forms`)."""
 
 import csv
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -114,9 +115,7 @@ def _cells(keys: Children) -> tuple[tuple[CellForm, ...], dict[str, Entry]]:
                 views[name] = own["field_of_view_deg"]
         else:
             cells.append(
-                CellForm(
-                    name, name, entry.unit_vector(), unit, _positive(scales.get(name)), _number(darks.get(name))
-                )
+                CellForm(name, name, entry.unit_vector(), unit, _positive(scales.get(name)), _number(darks.get(name)))
             )
     return tuple(cells), views
 
@@ -170,7 +169,7 @@ def _unit(entry: Entry | None) -> str:
 def _lookup(entry: Entry) -> tuple[tuple[float, ...], tuple[float, ...]]:
     pairs = [pair.numbers(2) for pair in entry.items()]
     readings, outputs = tuple(p[0] for p in pairs), tuple(p[1] for p in pairs)
-    if len(pairs) < 2 or any(b <= a for a, b in zip(readings, readings[1:], strict=False)):
+    if len(pairs) < 2 or any(b <= a for a, b in pairwise(readings)):
         raise ValueError(f"{entry.name}: expected two or more pairs [reading, output] whose readings grow")
     return readings, outputs
 
@@ -248,5 +247,3 @@ def _time(entry: Entry) -> TimeForm:
     if scale == "epoch" and epoch_ns is None:
         raise ValueError(f"{entry.name}: scale epoch given, expected epoch with the instant from which times count")
     return TimeForm(columns, unit, scale, epoch_ns)
-
-

@@ -19,7 +19,7 @@ class Broken(Exception):
 class Counted(NamedTuple):
     """Faults of one kind."""
 
-    count: int
+    times: int
     first_line: int
     detail: str  # of the first one
 
@@ -53,12 +53,12 @@ class Account:
     @property
     def refused_lines(self) -> int:
         """Lines that are lost."""
-        return sum(found.count for found in self.refused.values())
+        return sum(found.times for found in self.refused.values())
 
     @property
     def repaired_values(self) -> int:
         """Values that are lost in lines that are used."""
-        return sum(found.count for found in self.repaired.values())
+        return sum(found.times for found in self.repaired.values())
 
     def note_missing(self, what: str, lines: np.ndarray, missing: np.ndarray) -> None:
         """Counts missing values: the numbers (N,) of the lines, and how many are missing in each (N,)."""
@@ -74,12 +74,12 @@ def add(counts: dict, key: object, count: int, line: int, detail: str) -> None:
         counts[key] = Counted(count, line, detail)
         return
     earlier = line < known.first_line
-    counts[key] = Counted(known.count + count, min(line, known.first_line), detail if earlier else known.detail)
+    counts[key] = Counted(known.times + count, min(line, known.first_line), detail if earlier else known.detail)
 
 
 def counted_objects(counts: dict[str, Counted], name: str = "kind") -> list[dict[str, object]]:
     """Counts as `--json` prints them."""
-    return [{name: key, "count": found.count, "first_line": found.first_line} for key, found in counts.items()]
+    return [{name: key, "count": found.times, "first_line": found.first_line} for key, found in counts.items()]
 
 
 def first_of(faults: Iterable[Counted]) -> Counted | None:

@@ -19,7 +19,9 @@ _KINDS = {
     "field": re.compile(rf"{_FIELD_WORDS}_?([xyz123]){_FRAME}(?:_(?:n|u|m)?(?:t|g|tesla|gauss))?"),
     "sun": re.compile(rf"(?:true_)?(?:sun|sun_vector|sunvec|sv|s){_FRAME}_?([xyz]){_FRAME}"),
     "velocity": re.compile(r"(?:v|vel|velocity)_?(?:eci|ecef|j2000|itrf|gps|teme)?_?([xyz])(?:_.*)?"),
-    "position": re.compile(r"(?:r|pos|position|eci|ecef|gps|gps_pos|j2000|itrf|teme)_?(?:eci|ecef|teme)?_?([xyz])(?:_.*)?"),
+    "position": re.compile(
+        r"(?:r|pos|position|eci|ecef|gps|gps_pos|j2000|itrf|teme)_?(?:eci|ecef|teme)?_?([xyz])(?:_.*)?"
+    ),
 }
 _QUATERNION = re.compile(r"(?:q|quat|quaternion|att|q_bn|q_bi|q_ib)_?([wxyzs0-4])")
 _GEODETIC = (
@@ -35,7 +37,9 @@ _FACE = re.compile(
     r"(?:.*?[ _])??(?:(?P<sign>[pmn+-]|plus_?|minus_?|pos_?|neg_?)(?P<axis>[xyz])"
     r"|(?P<axis2>[xyz])_?(?P<sign2>[pmn+-]|plus|minus|pos|neg))(?:[ _]\w*)?"
 )
-_CELL = re.compile(r"(?:.*_)?(?:css|cell|pd|photodiode|diode|coarse_sun_sensor|sun_?sensor|ss|sol|i_pd|adc|ch|face)_?\w*")
+_CELL = re.compile(
+    r"(?:.*_)?(?:css|cell|pd|photodiode|diode|coarse_sun_sensor|sun_?sensor|ss|sol|i_pd|adc|ch|face)_?\w*"
+)
 _MINUS = {"m", "n", "-", "minus", "minus_", "neg", "neg_"}
 
 
@@ -163,7 +167,17 @@ def _unit(kind: str, table: Table, columns: tuple[str, ...], first: dict[str, np
         unit = "deg/s" if largest > 0.5 else "rad/s"
     elif kind == "field":
         # the Earth's field is 20 to 65 uT in low orbits
-        unit = "T" if largest < 1e-3 else "G" if largest < 1.0 else "uT" if largest < 150.0 else "mG" if largest < 1e3 else "nT"
+        unit = (
+            "T"
+            if largest < 1e-3
+            else "G"
+            if largest < 1.0
+            else "uT"
+            if largest < 150.0
+            else "mG"
+            if largest < 1e3
+            else "nT"
+        )
     elif kind == "position":
         unit = "km" if largest < 1e6 else "m"
     else:
@@ -193,9 +207,7 @@ def _attitude(table: Table, guesses: Guesses, free: list[str], plain: dict[str, 
             return
 
 
-def _rest(
-    table: Table, guesses: Guesses, free: list[str], plain: dict[str, str], first: dict[str, np.ndarray]
-) -> None:
+def _rest(table: Table, guesses: Guesses, free: list[str], plain: dict[str, str], first: dict[str, np.ndarray]) -> None:
     wheels = [name for name in free if _WHEEL.fullmatch(plain[name]) and name in first]
     if wheels:
         told = _told(table, wheels[0], WHEEL_SPEEDS)

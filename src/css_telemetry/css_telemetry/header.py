@@ -119,8 +119,8 @@ def _time_column(table: Table, others: list[int]) -> int:
         if found:
             return found[0]
     raise ValueError(
-        f"no column time; the header is {', '.join(table.header) or 'empty'}; a description names any other (--describe "
-        "proposes one)"
+        f"no column time; the header is {', '.join(table.header) or 'empty'}; a description names any other "
+        "(--describe proposes one)"
     )
 
 

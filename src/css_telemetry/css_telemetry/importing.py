@@ -165,7 +165,8 @@ def _find_orbit(report: ImportReport) -> None:
         return
     report.orbit = {"source": "elements", "model": "j2_integrated", **fit.elements._asdict()}
     report.orbit_notes.append(
-        f"orbit: elements fitted to the positions, which are {fit.rms_m:.3g} m (rms) from it, {fit.worst_m:.3g} m at most"
+        f"orbit: elements fitted to the positions, which are {fit.rms_m:.3g} m (rms) from it, at most "
+        f"{fit.worst_m:.3g} m"
     )
 
 

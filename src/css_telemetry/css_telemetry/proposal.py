@@ -158,8 +158,8 @@ def _scale_lines(columns: list[np.ndarray], fills: tuple[float, ...]) -> Iterato
     if dark:
         yield f"dark_level: {dark:.6g}  # the smallest reading of the table; measure it if you can"
     yield (
-        f"full_scale: {largest - dark:.6g}  # the largest reading above it: too small unless a cell once faced the Sun; "
-        "the data sheet knows better"
+        f"full_scale: {largest - dark:.6g}  # the largest reading above it: too small unless a cell once faced the "
+        "Sun; the data sheet knows better"
     )
 
 
@@ -178,8 +178,8 @@ def _aiding_lines(guesses: Guesses) -> Iterator[str]:
             frame = "teme"
         more = "" if velocity is None else f", velocity: {_list(velocity.columns)}, velocity_unit: {velocity.unit}"
         lines.append(
-            f"  position: {{frame: {frame}, columns: {_list(place.columns)}, unit: {place.unit}{more}}}  # {place.why}; "
-            "frame by the names"
+            f"  position: {{frame: {frame}, columns: {_list(place.columns)}, unit: {place.unit}{more}}}  "
+            f"# {place.why}; frame by the names"
         )
     if "geodetic" in vectors:
         place = vectors["geodetic"]
@@ -203,8 +203,8 @@ def _truth_lines(guesses: Guesses) -> Iterator[str]:
     if guesses.attitude is not None:
         guess, order = guesses.attitude
         lines.append(
-            f"  attitude: {{columns: {_list(guess.columns)}, order: {order}, direction: inertial_to_body}}  # {guess.why}; "
-            "the import compares the Sun with the cells: if they contradict, it is body_to_inertial"
+            f"  attitude: {{columns: {_list(guess.columns)}, order: {order}, direction: inertial_to_body}}  "
+            f"# {guess.why}; the import compares the Sun with the cells: if they contradict, it is body_to_inertial"
         )
     if "rate" in vectors and lines:
         lines.append(_vector("rate", vectors["rate"]) + "; the gyro, as nothing better is there")
@@ -230,5 +230,3 @@ def _list(names: tuple[str, ...]) -> str:
 def _quoted(name: str) -> str:
     """A name as YAML has it, in quotation marks where it could be something else."""
     return name if name.isidentifier() and name.isascii() else "'" + name.replace("'", "''") + "'"
-
-

@@ -159,8 +159,9 @@ def _measured(telemetry: Telemetry, row: int, stamp_ns: int, blind: bool) -> Ite
     for name, values in telemetry.temperatures.items():
         if np.isfinite(values[row]):
             codec = codec_of(Temperature)
-            yield _temperature_topic(name), codec.encode(
-                codec.sample(stamp_ns, BODY_FRAME, temperature=float(values[row]))
+            yield (
+                _temperature_topic(name),
+                codec.encode(codec.sample(stamp_ns, BODY_FRAME, temperature=float(values[row]))),
             )
 
 

@@ -29,10 +29,10 @@ def summary_lines(report: ImportReport) -> Iterator[str]:
     yield from _counts("refused", account.refused)
     yield from _counts("values left out", account.repaired)
     for what, found in account.missing.items():
-        yield f"{what}: {found.count}, the first in line {found.first_line}"
+        yield f"{what}: {found.times}, the first in line {found.first_line}"
     for value, found in account.fills.items():
         yield (
-            f"taken for a missing value of {found.detail}: {value:.10g}, {found.count} times, the first in line "
+            f"taken for a missing value of {found.detail}: {value:.10g}, {found.times} times, the first in line "
             f"{found.first_line}"
         )
     if report.gaps:
@@ -53,7 +53,7 @@ def summary_lines(report: ImportReport) -> Iterator[str]:
 
 def _counts(what: str, counts: Mapping[str, Counted]) -> Iterator[str]:
     for kind, found in counts.items():
-        yield f"  {what} ({kind}): {found.count}, the first is line {found.first_line}: {found.detail}"
+        yield f"  {what} ({kind}): {found.times}, the first is line {found.first_line}: {found.detail}"
 
 
 def _unknown_boot(report: ImportReport) -> Iterator[str]:
@@ -78,8 +78,8 @@ def _truth_lines(report: ImportReport) -> Iterator[str]:
     )
     if report.sun is not None:
         yield (
-            f"the Sun of the truth is {report.sun.median_deg:.2g} deg (median of {report.sun.lines} lines) from that of "
-            "the lit cells"
+            f"the Sun of the truth is {report.sun.median_deg:.2g} deg (median of {report.sun.lines} lines) from that "
+            "of the lit cells"
         )
 
 
@@ -100,7 +100,7 @@ def summary_object(report: ImportReport) -> dict[str, Any]:
         "repaired": counted_objects(account.repaired),
         "missing": counted_objects(account.missing),
         "fill_values": [
-            {"value": value, "of": found.detail, "count": found.count, "first_line": found.first_line}
+            {"value": value, "of": found.detail, "count": found.times, "first_line": found.first_line}
             for value, found in account.fills.items()
         ],
         "read_as": list(telemetry.read_as),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from css_recording.errors import BagError
-from css_telemetry.description import TableForm
+from css_telemetry.description import PLAIN, TableForm
 from css_telemetry.long_form import pivoted
 from css_telemetry.table_text import Block, Table, name_and_unit, text_table
 from css_telemetry.values import Column
@@ -22,7 +22,7 @@ _BLOCK = 100_000
 
 
 def open_table(
-    path: Path, content: bytes, names: Collection[str], form: TableForm = TableForm(), times: tuple[str, ...] = ()
+    path: Path, content: bytes, names: Collection[str], form: TableForm = PLAIN, times: tuple[str, ...] = ()
 ) -> Table:
     """The table in a file.
 

@@ -2,12 +2,12 @@
 """What people may hand in: the form of a table of telemetry, and of the file that describes it."""
 
 TELEMETRY_FORM = """\
-Reads a table of telemetry: text with commas, semicolons, tabulators, bars or blanks between its fields, in UTF-8, UTF-16
-or Latin-1, with decimal commas where commas do not separate; Parquet (.parquet, .pq); Excel (.xlsx).
+Reads a table of telemetry: text with commas, semicolons, tabulators, bars or blanks between its fields, in UTF-8,
+UTF-16 or Latin-1, with decimal commas where commas do not separate; Parquet (.parquet, .pq); Excel (.xlsx).
 
 The first line names the columns; units may stand behind names in brackets or in a line below. Lines that begin with #
-and empty lines are skipped. An empty field, `nan`, `na`, `#n/a`, `null`, `none`, `-` or `?` is a missing value, and so is
-a usual fill value such as -9999 or 65535 that lies far outside of everything else.
+and empty lines are skipped. An empty field, `nan`, `na`, `#n/a`, `null`, `none`, `-` or `?` is a missing value, and so
+is a usual fill value such as -9999 or 65535 that lies far outside of everything else.
 
 A value that cannot be read costs itself; a line whose time cannot be read, or does not go forward with those of the
 others, costs the line. Of lines that do not fit together the largest set that does is good.

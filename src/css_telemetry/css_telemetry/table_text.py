@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_recording.errors import BagError
-from css_telemetry.description import TableForm
+from css_telemetry.description import PLAIN, TableForm
 from css_telemetry.faults import Broken
 from css_telemetry.units import is_unit
 from css_telemetry.values import Column, is_number
@@ -39,7 +39,7 @@ class Block(NamedTuple):
     broken: list[tuple[int, Broken]]  # further lines that cannot be taken apart: number and fault
 
     @property
-    def count(self) -> int:
+    def size(self) -> int:
         """Lines, the broken ones included."""
         return len(self.lines) + len(self.broken)
 
@@ -62,7 +62,7 @@ def name_and_unit(column: str) -> tuple[str, str]:
     return (column[: found.start()].strip(), found.group(1).strip()) if found else (column, "")
 
 
-def text_table(path: Path, content: bytes, names: Collection[str], form: TableForm = TableForm()) -> Table:
+def text_table(path: Path, content: bytes, names: Collection[str], form: TableForm = PLAIN) -> Table:
     """The table of a text.
 
     Args:
@@ -165,9 +165,7 @@ def _block(part: list[tuple[int, str]], separator: str, width: int) -> Block:
     for number, line in part:
         fields = _split(line, separator)
         if fields is None:
-            broken.append(
-                (number, Broken("not readable", "a quotation mark is left open or stands inside a field"))
-            )
+            broken.append((number, Broken("not readable", "a quotation mark is left open or stands inside a field")))
         elif len(fields) != width:
             detail = f"expected {width} fields, found {len(fields)}"
             broken.append((number, Broken("wrong number of fields", detail)))

@@ -142,8 +142,8 @@ def _refuse_different_units(table: Table, description: Description) -> None:
     if len(units) > 1:
         first, second = (table.header[index] for index in list(units.values())[:2])
         raise BagError(
-            f"{table.path}: line {table.header_line}: the cells {first} and {second} have different units, expected one, "
-            "or a full scale for each"
+            f"{table.path}: line {table.header_line}: the cells {first} and {second} have different units, expected "
+            "one, or a full scale for each"
         )
 
 
@@ -157,9 +157,7 @@ def _telemetry(
 ) -> Telemetry:
     aiding, lines, account = description.aiding, readings.lines, readings.account
     units = {
-        unit: None
-        for cell in description.cells
-        if (unit := cell.unit or _unit_of(table, cell.column)) not in ("", "1")
+        unit: None for cell in description.cells if (unit := cell.unit or _unit_of(table, cell.column)) not in ("", "1")
     }
     telemetry = Telemetry(
         description,

@@ -60,7 +60,9 @@ def true_states(telemetry: Telemetry) -> TrueStates | None:
     r_n, v_n = _place(telemetry, rows)
     if r_n is not None:
         known.append(POSITION)
-    sun_position = sun_positions(int(telemetry.stamps_ns[0]), (telemetry.stamps_ns[rows] - telemetry.stamps_ns[0]) * 1e-9)
+    sun_position = sun_positions(
+        int(telemetry.stamps_ns[0]), (telemetry.stamps_ns[rows] - telemetry.stamps_ns[0]) * 1e-9
+    )
     line = sun_position if r_n is None else sun_position - r_n
     distance = np.linalg.norm(line, axis=1)
     sun_n = _sun_n(telemetry, rows, sigma, line / distance[:, np.newaxis])

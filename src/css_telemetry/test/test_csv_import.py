@@ -16,8 +16,8 @@ from css_common.mission_file import flattened, read_sections
 from css_common.schema import checked_values
 from css_common.shared_sections import shared_parameters
 from css_recording.bag_reader import BagReader
-from css_telemetry.commands.import_csv import main
 from css_recording.errors import BagError
+from css_telemetry.commands.import_csv import main
 from css_telemetry.description import CellForm, Description
 from css_telemetry.importing import examined, record
 from css_telemetry.telemetry import read_telemetry, refuse_unscaled
@@ -81,7 +81,7 @@ def test_values_units_and_gaps_as_other_readers_see_them(tmp_path, doctor):
     assert {m.header.frame_id for m in imu} == {"bus"}
 
     assert report.messages == {"/truth": 3, "/css/voltages": 3, "/gyro/imu": 4}
-    missing = {what: (found.count, found.first_line) for what, found in report.telemetry.account.missing.items()}
+    missing = {what: (found.times, found.first_line) for what, found in report.telemetry.account.missing.items()}
     assert missing == {
         "missing cell outputs in the other lines": (1, 5),
         "lines used without any cell output": (1, 6),
@@ -134,7 +134,7 @@ def test_names_of_rate_columns(tmp_path, name, unit):
     stem, *frame = name.split("_")
     columns = ",".join("_".join([stem, axis, *frame, unit]) for axis in "XYz")
     telemetry = read_telemetry(table(tmp_path, f"time,c1,c2,{columns}\n1370000000,1,1,1,2,3\n"), LAYOUT)
-    assert telemetry.rate.tolist() == [[1.0, 2.0, 3.0]]
+    assert present(telemetry.rate).tolist() == [[1.0, 2.0, 3.0]]
 
 
 HEADER = "time,c1,c2,omega_x_rad_s,omega_y_rad_s,omega_z_rad_s,sun_x,sun_y,sun_z\n"
@@ -155,7 +155,11 @@ REFUSED = [
     ("2023-366T00:00:00,1,1,0,0,0,1,0,0", "column time: '2023-366T00:00:00' found", "no time"),
     ('1370000001,"1,1,0,0,0,1,0,0', "a quotation mark is left open", "not readable"),
     ("1370000000000,1,1,0,0,0,1,0,0", "is a time since 1970 in ms: --time-unit ms", "no time"),
-    ("12.5,1,1,0,0,0,1,0,0", "12.5 s is not a time since 1970; --epoch, or time: epoch, names its beginning", "no epoch"),
+    (
+        "12.5,1,1,0,0,0,1,0,0",
+        "12.5 s is not a time since 1970; --epoch, or time: epoch, names its beginning",
+        "no epoch",
+    ),
     ("1370000000,1,1,0,0,0,1,0,0", "column time: it does not go forward", "does not go forward"),
 ]
 LEFT_OUT = [
@@ -178,7 +182,7 @@ def test_a_value_that_cannot_be_read_costs_itself_a_time_its_line(tmp_path, line
     assert account.lines == 3 and len(telemetry.stamps_ns) == 3 - refused == 3 - account.refused_lines
     counts, others = (account.refused, account.repaired) if refused else (account.repaired, account.refused)
     ((found, counted),) = counts.items()
-    assert kind in found and words in counted.detail and (counted.count, counted.first_line) == (1, 4)
+    assert kind in found and words in counted.detail and (counted.times, counted.first_line) == (1, 4)
     assert others == {}
 
 
@@ -196,9 +200,9 @@ def test_what_a_bad_value_costs(tmp_path):
     text = HEADER + GOOD + "1370000001,x,1,0,y,0,0,0,0\n1370000002,1,1,0,0,0,1,0,0\n"
     telemetry = read_telemetry(table(tmp_path, text), LAYOUT)
     np.testing.assert_array_equal(telemetry.cells, [[1, 1], [math.nan, 1], [1, 1]])
-    assert np.isfinite(telemetry.rate).all(axis=1).tolist() == [True, False, True]
-    assert np.isfinite(telemetry.truth.sun_b).all(axis=1).tolist() == [True, False, True]
-    assert {kind: (c.count, c.first_line) for kind, c in telemetry.account.repaired.items()} == {
+    assert np.isfinite(present(telemetry.rate)).all(axis=1).tolist() == [True, False, True]
+    assert np.isfinite(present(telemetry.truth.sun_b)).all(axis=1).tolist() == [True, False, True]
+    assert {kind: (c.times, c.first_line) for kind, c in telemetry.account.repaired.items()} == {
         "no number": (2, 3),
         "no direction": (1, 3),
     }

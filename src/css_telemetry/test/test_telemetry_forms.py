@@ -140,7 +140,7 @@ def test_fill_values_are_missing_and_counted(tmp_path):
     np.testing.assert_array_equal(telemetry.cells, [[nan, 0.5], [0.5, nan], [0.5, 0.0]])
     assert np.isfinite(telemetry.rate).all(axis=1).tolist() == [True, False, True]
     assert np.isfinite(telemetry.truth.sun_b).all(axis=1).tolist() == [True, True, False]
-    assert {value: (c.count, c.first_line) for value, c in telemetry.account.fills.items()} == {
+    assert {value: (c.times, c.first_line) for value, c in telemetry.account.fills.items()} == {
         -9999.0: (3, 2),
         65535.0: (1, 3),
     }

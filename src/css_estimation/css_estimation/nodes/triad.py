@@ -55,8 +55,9 @@ class _FieldSample(NamedTuple):
 class Triad(Component):
     """Attitude at each passage of the Sun, from its direction and the field at the same instant (TRIAD).
 
-    Of cells it is that of each stamp at which lit cells tell the Sun. Of slits the field is interpolated between samples, so an attitude goes out two samples after its instant: it is that of
-    `delay` before the stamp. References are the Sun's ephemeris and IGRF at the flight's position.
+    Of cells it is that of each stamp at which lit cells tell the Sun. Of slits the field is interpolated between
+    samples, so an attitude goes out two samples after its instant: it is that of `delay` before the stamp. References
+    are the Sun's ephemeris and IGRF at the flight's position.
     """
 
     shared = ("orbit", "magnetometer", "cells")

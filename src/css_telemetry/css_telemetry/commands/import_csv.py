@@ -56,7 +56,9 @@ def _parser() -> CommandParser:
     )
     parser.add_argument("--epoch", metavar="UTC", help="instant from which the times of the table count")
     parser.add_argument(
-        "--time-unit", choices=_UNITS, help="of times that are numbers (default: the description's, the header's, else s)"
+        "--time-unit",
+        choices=_UNITS,
+        help="of times that are numbers (default: the description's, the header's, else s)",
     )
     parser.add_argument(
         "--full-scale",

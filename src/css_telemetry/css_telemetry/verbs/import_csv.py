@@ -62,8 +62,8 @@ def _verdict(parser: CommandParser, report: ImportReport, skip_bad: bool) -> int
         wrong.append(f"{counts} of {account.lines} lines; --skip-bad takes that as it is")
     if report.sun is not None and report.sun.doubtful:
         wrong.append(
-            f"the Sun of the truth is {report.sun.median_deg:.0f} deg (median) beside the one that the cells see: check "
-            "the order and direction of the attitude, the frame, the times, the normals"
+            f"the Sun of the truth is {report.sun.median_deg:.0f} deg (median) beside the one that the cells see: "
+            "check the order and direction of the attitude, the frame, the times, the normals"
         )
     for line in wrong:
         complain(parser.prog, line, "not as it should be")
