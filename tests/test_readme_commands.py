@@ -80,7 +80,8 @@ def test_a_flight_and_its_replays_do_not_collide(place, monkeypatch, capfd):
 
 def test_telemetry_is_imported_and_replayed(place, monkeypatch, capfd):
     monkeypatch.chdir(place)
-    assert import_csv.main(of_verb("import-csv")) == 0
+    assert import_csv.main(of_verb("import-csv", "--describe")) == 0
+    assert import_csv.main(of_verb("import-csv", "bags/mine")) == 0
     assert "broken" not in capfd.readouterr().out
     assert replay.main(of_verb("replay", "bags/mine")) == 0
 

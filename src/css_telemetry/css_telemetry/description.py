@@ -124,11 +124,15 @@ class Truth(NamedTuple):
     eclipse: bool = False  # that column is 1 in the shadow
 
 
+USUAL_VIEW_DEG = 120.0
+"""Full cone of view of a cell of which no description tells one."""
+
+
 class Description(NamedTuple):
     """Everything that is said of a table."""
 
     cells: tuple[CellForm, ...]
-    field_of_view_deg: float = 120.0
+    field_of_view_deg: float | None = None  # None: not told, so that it is taken for the usual
     clip_normal_b: Triple = (0.0, 0.0, 0.0)
     table: TableForm = PLAIN
     time: TimeForm | None = None  # None: by the header
@@ -136,6 +140,11 @@ class Description(NamedTuple):
     aiding: Aiding | None = None
     truth: Truth | None = None
     inertia: tuple[float, ...] = ()  # [kg m^2] of the spacecraft, nine by rows
+
+    @property
+    def dates_known(self) -> bool:
+        """Whether stamps are dates; those of a boot at an instant that nobody told are none."""
+        return self.time is None or self.time.scale != "boot" or self.time.epoch_ns is not None
 
     @property
     def names_roles(self) -> bool:

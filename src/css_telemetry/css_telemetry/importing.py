@@ -126,10 +126,12 @@ def examined(telemetry: Telemetry, folder: Path) -> ImportReport:
     """What a table tells about itself, before anything is written into `folder`.
 
     Raises:
-        BagError: the element set of its description does not hold for its time.
+        BagError: the element set of its description does not hold for its time, or the ephemeris needs dates that
+            it has not.
     """
     steps = np.diff(telemetry.stamps_ns) * 1e-9
     period_s = round(float(np.median(steps)), 6) if len(steps) else LONGEST_PERIOD_S
+    _refuse_ephemeris_without_date(telemetry)
     states = true_states(telemetry)
     report = ImportReport(
         folder,
@@ -144,11 +146,25 @@ def examined(telemetry: Telemetry, folder: Path) -> ImportReport:
     return report
 
 
+def _refuse_ephemeris_without_date(telemetry: Telemetry) -> None:
+    truth = telemetry.description.truth
+    if truth is None or truth.attitude is None or telemetry.description.dates_known:
+        return
+    if truth.sun is None and truth.sun_inertial is None:
+        raise BagError(
+            "the description: truth.attitude: given without a Sun, and times count from a boot that nobody dated, "
+            "expected time.epoch, truth.sun or truth.sun_inertial"
+        )
+
+
 def _find_orbit(report: ImportReport) -> None:
     """The orbit by which estimators will know their place; none is made up."""
     telemetry = report.telemetry
     aiding = telemetry.description.aiding
     form = aiding.position if aiding is not None else None
+    if form is not None and not telemetry.description.dates_known:
+        report.orbit_notes.append("orbit: none, for the instant of the boot is not known: time: epoch tells it")
+        return
     if form is None:
         report.orbit_notes.append("orbit: none given, so that estimators that need one ask for it")
         return

@@ -24,6 +24,7 @@ from css_msgs.msg import CssVoltages, SpacecraftState, WheelState
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
 from css_recording.provenance import IMPORTED_FROM, software_versions
+from css_telemetry.description import USUAL_VIEW_DEG
 from css_telemetry.telemetry import Telemetry
 from css_telemetry.true_states import TrueStates
 
@@ -103,7 +104,7 @@ def mission_text(
         "mission.period": period_s,
         **{f"orbit.{key}": value for key, value in orbit.items()},
         "cells.normals": [component for cell in description.cells for component in cell.normal_b],
-        "cells.field_of_view_deg": description.field_of_view_deg,
+        "cells.field_of_view_deg": description.field_of_view_deg or USUAL_VIEW_DEG,
         "cells.clip_normal": list(description.clip_normal_b),
         "io.body_frame": BODY_FRAME,
         "io.inertial_frame": INERTIAL_FRAME,

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from css_common.epochs import format_utc
+from css_telemetry.description import USUAL_VIEW_DEG
 from css_telemetry.faults import Counted, counted_objects
 from css_telemetry.header import likenesses
 from css_telemetry.importing import ImportReport
@@ -39,6 +40,8 @@ def summary_lines(report: ImportReport) -> Iterator[str]:
         yield f"gaps in time: {report.gaps}, the longest {report.longest_gap_s:g} s"
     if telemetry.read_as:
         yield f"read as: {', '.join(telemetry.read_as)}"
+    if telemetry.description.field_of_view_deg is None:
+        yield f"field of view of the cells: not told, taken for {USUAL_VIEW_DEG:g} deg (field_of_view_deg tells it)"
     yield from _truth_lines(report)
     yield from report.orbit_notes
     if telemetry.ignored_columns:
@@ -57,8 +60,7 @@ def _counts(what: str, counts: Mapping[str, Counted]) -> Iterator[str]:
 
 
 def _unknown_boot(report: ImportReport) -> Iterator[str]:
-    time = report.telemetry.description.time
-    if time is not None and time.scale == "boot" and time.epoch_ns is None:
+    if not report.telemetry.description.dates_known:
         yield "the instant of the boot is not known: dates are not those of the flight (time: epoch tells it)"
 
 
@@ -108,6 +110,8 @@ def summary_object(report: ImportReport) -> dict[str, Any]:
         "largest_output": telemetry.largest_output,
         "truth": list(report.states.known) if report.states is not None else [],
         "sun_against_cells_deg": report.sun.median_deg if report.sun is not None else None,
+        "dates_known": telemetry.description.dates_known,
+        "field_of_view_deg": telemetry.description.field_of_view_deg,
         "orbit": report.orbit or None,
         "notes": report.orbit_notes,
     }
