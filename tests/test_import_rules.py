@@ -16,7 +16,7 @@ FLOORS = (
     {"css_msgs"},
     {"css_common"},
     {"css_environment", "css_recording", "css_sensors"},
-    {"css_sim", "css_estimation", "sunpoint_control", "css_drivers"},
+    {"css_sim", "css_estimation", "sunpoint_control", "css_drivers", "css_telemetry"},
     {"css_analysis"},
     {"css_bringup", "css_monte_carlo"},
     {"css_papers"},

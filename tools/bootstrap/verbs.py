@@ -28,7 +28,7 @@ VERBS = {
     "record": Verb("record topics into an MCAP bag", "css_recording", "recorder"),
     "play": Verb("play a bag onto live topics", "css_recording", "player"),
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
-    "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
+    "import-csv": Verb("turn a table of measurements into a bag", "css_telemetry", "import_csv"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),

@@ -41,7 +41,7 @@ DURATION = real(
     "simulated time to fly",
     low=0.0,
     open_low=True,
-    high=3.2e7,
+    high=3.2e8,
     example="mission: {duration: 5550.0}",
 )
 PERIOD = real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0)
