@@ -245,6 +245,23 @@ MEASURES: Table = (
     ),
 )
 
+SAMPLING: Table = (
+    choice(
+        "sampling.method",
+        "random",
+        ("random", "lhs", "sobol", "saltelli"),
+        "how dispersed parameters are drawn over the cases of a study",
+    ),
+    integer(
+        "sampling.cases",
+        0,
+        "-",
+        "cases that a Latin hypercube is spread over, or base points of a Saltelli design",
+        low=0,
+        high=2**24,
+    ),
+)
+
 GRAPH: Table = (
     texts(
         "graph.nodes",
@@ -427,6 +444,7 @@ SECTIONS: dict[str, Section] = {
     "rods": Section(RODS, _rods_conflicts),
     "magnetometer": Section(MAGNETOMETER),
     "measures": Section(MEASURES),
+    "sampling": Section(SAMPLING),
     "graph": Section(GRAPH),
     "lockstep": Section(LOCKSTEP),
     "io": Section(IO, _io_conflicts),
