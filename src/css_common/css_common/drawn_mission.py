@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from css_common.dispersions import drawn_value
 from css_common.mission import SHARED, Mission, MissionError
 from css_common.sampling import sample_of
-from css_common.schema import ParameterError, shown
+from css_common.schema import ParameterError
 
 
 class Drawn(NamedTuple):
@@ -78,6 +78,6 @@ def values_at(mission: Mission, points: Any) -> dict[str, Any]:
 def _text(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_text(item) for item in value) + "]"
-    return (
-        f"{value:.6g}" if isinstance(value, float) else shown(value) if isinstance(value, str) else str(value).lower()
-    )
+    if isinstance(value, float):
+        return f"{value:.6g}"
+    return value if isinstance(value, str) else str(value).lower()

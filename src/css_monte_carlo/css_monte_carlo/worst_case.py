@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The worst flight that can be found: a search over dispersed parameters and over the cases' own draws.
 
-Differential evolution (Storn & Price 1997) starts from the worst cases of a study and moves their parameters, a normal one
-within 3 sigma. Numbers of cases are names, not quantities: a child flies the draws of one of its parents.
+Differential evolution (Storn & Price 1997) starts from the worst cases of a study and moves their parameters, a normal
+one within 3 sigma. Numbers of cases are names, not quantities: a child flies the draws of one of its parents.
 """
 
 import math
