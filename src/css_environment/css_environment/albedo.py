@@ -26,8 +26,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.direction_grid import grid_cell
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, dot, multiply_transposed
+from css_common.vectors import Mat3, Vec3, dot, multiply, multiply_transposed, unit
 from css_environment.earth_light import (
     DISC,
     DISC_COS,
@@ -55,17 +56,27 @@ _TERMS = 6 * PATCHES
 NARROWEST_SIN = 0.05
 
 
+_SAME_VIEW = np.zeros(0)
+_FREE_SKY = np.zeros(0, np.uint32)
+
+
 class Screen(NamedTuple):
-    """Structure that hides part of the sky from cells: all beyond an angle to an axis.
+    """What hides part of the sky from cells: structure beyond an angle to an axis, structure anywhere, narrow views.
 
     A cell whose `side` is positive receives all of the light from directions whose cosine to the axis is at least
     `full_cos`, none below `dark_cos`, a linear part between. If `side` is negative the axis is mirrored; if zero
     nothing is hidden.
+
+    `views` has the cosine of half the view of each cell (N,), where they are not all alike. `blocked` has for each cell
+    of the grid of `css_common.direction_grid` a mask of the cells that see nothing there; both are empty where there is
+    no such thing. A patch of the Earth's light is hidden when the middle of it is.
     """
 
     axis_b: Vec3  # unit vector, or zeros: no screen
     dark_cos: float
     full_cos: float
+    views: np.ndarray = _SAME_VIEW
+    blocked: np.ndarray = _FREE_SKY
 
 
 def plane_screen(normal_b) -> Screen:
@@ -83,6 +94,27 @@ def soft_screen(axis_b, full_angle: float, dark_angle: float) -> Screen:
 def new_workspace() -> np.ndarray:
     """Room for `albedo_output` to work in, (224,) float32; each thread needs its own."""
     return aligned_rows(7)
+
+
+def with_views(screen: Screen, views: np.ndarray, blocked: np.ndarray) -> Screen:
+    """The screen with the views of single cells and what is blocked from them; empty: as without."""
+    views = np.ascontiguousarray(views, dtype=np.float64) if len(views) else _SAME_VIEW
+    blocked = np.ascontiguousarray(blocked, dtype=np.uint32) if len(blocked) else _FREE_SKY
+    return screen._replace(views=views, blocked=blocked)
+
+
+@kernel
+def view_cosine(screen: Screen, i: int, of_all: float) -> float:
+    """Cosine of half the view of cell `i`, which is `of_all` where the views are alike."""
+    return screen.views[i] if screen.views.shape[0] > 0 else of_all
+
+
+@kernel
+def is_blocked(screen: Screen, i: int, direction_b: Vec3) -> bool:
+    """Whether structure is in front of cell `i` in a unit direction."""
+    if screen.blocked.shape[0] == 0:
+        return False
+    return (int(screen.blocked[grid_cell(direction_b)]) >> i) & 1 != 0
 
 
 @kernel
@@ -106,7 +138,7 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
         light: patches from `earth_light.albedo_sources`.
         cells: (N,) records with the fields nx, ny, nz (outward unit normal in b) and side (see `Screen`).
         screen: what hides part of the sky.
-        cos_half_view: cosine of half the full cone of view, 0 to 1.
+        cos_half_view: cosine of half the full cone of view, 0 to 1, of cells that have none of their own.
         dcm_bn: rotation from n to b.
         work: room from `new_workspace`.
         output: (N,) written.
@@ -147,6 +179,12 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
     # A patch spreads over cosines mean - width to mean + width; those above the edge of the cone count.
     edge, spread = _F(cos_half_view), _F(edge_sin)
     for i in range(output.shape[0]):
+        if screen.views.shape[0] > 0:
+            own = screen.views[i]
+            own_sin = math.sqrt(max(0.0, 1.0 - own * own))
+            reach_cos = own * light[DISC + DISC_COS] - own_sin * light[DISC + DISC_SIN]
+            edge_sin = max(NARROWEST_SIN, own_sin)
+            edge, spread = _F(own), _F(edge_sin)
         normal_n = multiply_transposed(dcm_bn, (cells[i].nx, cells[i].ny, cells[i].nz))
         output[i] = 0.0
         if dot(normal_n, nadir_n) > reach_cos:
@@ -167,6 +205,11 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
                 high = mean + width
                 low = min(max(mean - width, edge), high)
                 work[_TERMS + j] = passed * (high - low) * (high + low)
+            if screen.blocked.shape[0] > 0:
+                for j in range(PATCHES):
+                    patch_n = (float(light[X + j]), float(light[Y + j]), float(light[Z + j]))
+                    if light[LIGHT + j] > _ZERO and is_blocked(screen, i, unit(multiply(dcm_bn, patch_n))):
+                        work[_TERMS + j] = _ZERO
             # The terms are added apart, in a fixed order: a sum inside the loop would keep it from vector instructions.
             a, b, c, d = _ZERO, _ZERO, _ZERO, _ZERO
             for j in range(0, PATCHES, 4):

@@ -2,8 +2,8 @@
 """Which of the dispersed parameters matter: Sobol indices of a study that was drawn by a Saltelli design.
 
 The first index of a parameter is the share of the variance that it causes alone, the total index the share that would
-be gone if it were known. What is drawn for a case without being a dispersion (initial state, noise, clouds) counts as one
-more parameter, so that indices are shares of all the variance that there is.
+be gone if it were known. What is drawn for a case without being a dispersion (initial state, noise, clouds) counts as
+one more parameter, so that indices are shares of all the variance that there is.
 """
 
 import warnings

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Searches where the cells of a mission should look: a front of heading error against number of cells.
 
-A layout is judged with the Sun over the sphere and near the normal of the arrays, under the light of the Earth at sunlit
-places of the orbit, by the error that one estimate from its readings has; with all cells, and with each one dead. Every
-number of cells is written as a mission that flies.
+A layout is judged with the Sun over the sphere and near the normal of the arrays, under the light of the Earth at
+sunlit places of the orbit, by the error that one estimate from its readings has, with all cells and with each one dead.
+Every number of cells is written as a mission that flies.
 """
 
 import signal
@@ -20,6 +20,7 @@ _EXAMPLES = (
     "okeefe_2013 --cells 4-10 --out layouts",
     "cubesat_3u_safe --faces +x -x +y -y --tilt 20 --cells 6-8 --json",
     "okeefe_2013 --cells 8 --pointing 0 --weights 1,0,0",
+    "cubesat_3u_safe --structure docs/samples/cubesat_boxes.yaml --views 90 120",
 )
 _NOTES = """\
 Errors are root mean squares over the two axes of the heading. mean: over the scenes; worst: of all; failed: the mean
@@ -41,7 +42,7 @@ def _parser() -> CommandParser:
         metavar="FACE",
         help="faces of the body that cells may be on (default: all six)",
     )
-    add("--tilt", type=tilt, default=55.0, metavar="DEG", help="largest tilt from the face [deg] (default: %(default)s)")
+    add("--tilt", type=tilt, default=55.0, metavar="DEG", help="largest tilt from a face [deg] (default: %(default)s)")
     add(
         "--pointing",
         type=share,
@@ -60,7 +61,20 @@ def _parser() -> CommandParser:
         type=positive,
         default=20.0,
         metavar="DEG",
-        help="what the estimator knows before it looks at the cells, 1 sigma about each axis [deg] (default: %(default)s)",
+        help="what is known before the cells are read, 1 sigma about each axis [deg] (default: %(default)s)",
+    )
+    add(
+        "--views",
+        nargs="+",
+        type=number("an angle from 10 to 180 deg", lambda value: 10.0 <= value <= 180.0),
+        metavar="DEG",
+        help="full cones of view that cells may have [deg] (default: those of the mission)",
+    )
+    add(
+        "--structure",
+        type=Path,
+        metavar="FILE",
+        help="what blocks the cells: an STL, OBJ or PLY file in m, or boxes in a YAML file (docs/layout.md)",
     )
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter")
     add("--out", type=Path, metavar="DIR", help="folder of the missions (default: layouts/MISSION)")

@@ -2,7 +2,7 @@
 """The front of error against number of cells, each point a mission that flies."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,6 +13,7 @@ from css_common.preflight import preflight
 from css_common.sections import name_for_files
 from css_design.errors import DesignError
 from css_design.layout.heading_error import HeadingError
+from css_design.layout.readings import Cells
 from css_design.layout.search import Found
 
 
@@ -32,12 +33,13 @@ class Point(NamedTuple):
     def as_object(self) -> dict[str, Any]:
         """What `--json` says."""
         return {
-            "cells": len(self.found.normals_b),
+            "cells": self.found.cells.count,
             **error_object(self.found.error),
             "cost_deg": self.found.cost,
             "on_front": self.on_front,
             "mission": self.mission,
-            "normals": [[float(x) for x in normal] for normal in self.found.normals_b],
+            "normals": [[float(x) for x in normal] for normal in self.found.cells.normals_b],
+            "fields_of_view_deg": [float(view) for view in self.found.cells.views_deg],
         }
 
 
@@ -62,24 +64,42 @@ def front_of(best: Mapping[int, Found], missions: Mapping[int, str]) -> list[Poi
     return points
 
 
-def mission_with_cells(mission: Mission, normals_b: np.ndarray) -> Mission:
+def mission_with_cells(mission: Mission, cells: Cells, blocked: np.ndarray) -> Mission:
     """The mission with other cells, named after their number.
+
+    Args:
+        blocked: masks of `cells.blocked`, or none.
 
     Raises:
         DesignError: it does not fly with them.
     """
-    flat = ",".join(repr(float(x)) for x in normals_b.ravel())
-    name = name_for_files(f"{mission.name}_{len(normals_b)}_cells")
+    alike = bool(np.ptp(cells.views_deg) == 0.0)
+    overrides = {
+        "cells.normals": _words(cells.normals_b.ravel().tolist()),
+        "cells.field_of_view_deg": repr(float(cells.views_deg[0])),
+        "cells.fields_of_view_deg": "" if alike else _words(cells.views_deg.tolist()),
+        "cells.blocked": _words(blocked.tolist()) if np.any(blocked) else "",
+        "mission.name": name_for_files(f"{mission.name}_{cells.count}_cells"),
+    }
     try:
-        made = mission.with_overrides([f"cells.normals={flat}", f"mission.name={name}"])
+        made = mission.with_overrides(f"{key}={text}" for key, text in overrides.items())
         preflight(made)
     except MissionError as error:
-        raise DesignError(f"{mission.name} does not fly with {len(normals_b)} cells: {error}") from error
+        raise DesignError(f"{mission.name} does not fly with {cells.count} cells: {error}") from error
     return made
 
 
-def write_missions(mission: Mission, best: Mapping[int, Found], folder: Path) -> tuple[dict[int, str], list[str]]:
+def _words(numbers: list[float]) -> str:
+    return ",".join(map(repr, numbers))
+
+
+def write_missions(
+    mission: Mission, best: Mapping[int, Found], blocked: Callable[[Cells], np.ndarray], folder: Path
+) -> tuple[dict[int, str], list[str]]:
     """Files of the missions by number of cells, and what could not be written as one, a line each.
+
+    Args:
+        blocked: masks of what the structure blocks from cells.
 
     Raises:
         DesignError: the folder cannot be written.
@@ -88,15 +108,30 @@ def write_missions(mission: Mission, best: Mapping[int, Found], folder: Path) ->
     refused: list[str] = []
     for count, found in sorted(best.items()):
         try:
-            made = mission_with_cells(mission, found.normals_b)
+            made = mission_with_cells(mission, found.cells, blocked(found.cells))
         except DesignError as error:
             refused.append(str(error))
             continue
-        file = folder / f"{made.name}.yaml"
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            file.write_text(made.text(), encoding="utf-8")
-        except OSError as error:
-            raise DesignError(f"{file}: cannot be written: {error.strerror}") from error
-        written[count] = str(file)
+        written[count] = _written(made, folder)
     return written, refused
+
+
+def write_own(mission: Mission, cells: Cells, blocked: np.ndarray, folder: Path) -> str:
+    """File of the mission as it is, with what a structure blocks from its cells.
+
+    Raises:
+        DesignError: it does not fly, or the folder cannot be written.
+    """
+    made = mission_with_cells(mission, cells, blocked)
+    name = name_for_files(f"{mission.name}_blocked")
+    return _written(made.with_overrides([f"mission.name={name}"]), folder)
+
+
+def _written(mission: Mission, folder: Path) -> str:
+    file = folder / f"{mission.name}.yaml"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file.write_text(mission.text(), encoding="utf-8")
+    except OSError as error:
+        raise DesignError(f"{file}: cannot be written: {error.strerror}") from error
+    return str(file)

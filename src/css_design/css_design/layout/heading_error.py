@@ -25,7 +25,6 @@ from css_common.vectors import Vec3, add, angle_between, axes_across, dot, row, 
 from css_design.layout.readings import Readings
 from css_design.layout.scenes import Scenes
 
-
 _STEPS = 4
 _LONGEST_STEP = 0.4  # [rad]
 _A_GUESS = 0.5 * math.pi  # [rad] mean error of any direction

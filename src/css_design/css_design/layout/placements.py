@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from css_design.errors import DesignError
+from css_design.layout.readings import Cells
 
 FACES = {
     "+x": (1.0, 0.0, 0.0),
@@ -34,8 +35,8 @@ def faces_of(names: Sequence[str]) -> list[np.ndarray]:
     return [np.array(FACES[name]) for name in dict.fromkeys(names)]
 
 
-def candidates(faces: Sequence[np.ndarray], tilts_deg: Sequence[float]) -> np.ndarray:
-    """(K, 3) normals of the places that a search begins with: each tilt of each face, in eight directions."""
+def candidates(faces: Sequence[np.ndarray], tilts_deg: Sequence[float], views_deg: Sequence[float]) -> Cells:
+    """Places that a search begins with: each tilt of each face, in eight directions, with each cone of view."""
     found: list[np.ndarray] = []
     for face in faces:
         first = np.eye(3)[int(np.argmin(np.abs(face)))]
@@ -46,7 +47,7 @@ def candidates(faces: Sequence[np.ndarray], tilts_deg: Sequence[float]) -> np.nd
                 normal = math.cos(tilt) * face + math.sin(tilt) * across
                 if not any(normal @ other > _SAME for other in found):
                     found.append(normal)
-    return np.array(found)
+    return Cells(np.repeat(found, len(views_deg), axis=0), np.tile(views_deg, len(found)))
 
 
 def allowed(normals_b: np.ndarray, faces: Sequence[np.ndarray], tilt_deg: float, clip_normal_b: np.ndarray) -> bool:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cells read in each scene: Sun and Earth through the signal chain that flies, without noise."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,10 +10,26 @@ from css_common.kernel import outer_kernel
 from css_common.random_streams import RandomKey, random_key
 from css_common.vectors import mat3, row
 from css_design.layout.scenes import Scenes
-from css_environment.albedo import albedo_output, new_workspace, transmission
+from css_environment.albedo import albedo_output, is_blocked, new_workspace, transmission, view_cosine
 from css_environment.earth_light import aligned_rows
 from css_sim.fault_effects import FAULT
 from css_sim.sun_cells import SunCells, sample
+
+
+class Cells(NamedTuple):
+    """Cells that are laid out."""
+
+    normals_b: np.ndarray  # (N, 3)
+    views_deg: np.ndarray  # (N,) full cones of view
+
+    @property
+    def count(self) -> int:
+        """How many."""
+        return len(self.views_deg)
+
+    def chosen(self, numbers: Sequence[int]) -> "Cells":
+        """Some of them."""
+        return Cells(self.normals_b[list(numbers)], self.views_deg[list(numbers)])
 
 
 class Readings(NamedTuple):
@@ -86,6 +103,7 @@ def _read(
         for i in range(count):
             cell = cells[i]
             cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
-            sees = cosine > 0.0 and cosine >= chain.cos_half_view
+            sees = cosine > 0.0 and cosine >= view_cosine(chain.screen, i, chain.cos_half_view)
+            sees = sees and not is_blocked(chain.screen, i, sun_b)
             seen_out[i, s] = sees and transmission(chain.screen, cell.side, sun_b) > 0.5
             outputs_out[i, s] = voltages[i]

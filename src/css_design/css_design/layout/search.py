@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Searches layouts of 1, 2, ... cells: exchange of places on the faces, then normals moved freely within their tilt.
 
-The exchange is that of optimal design of experiments (Fedorov 1972): from the best layout of one cell less, the best place
-for one more; then each cell in turn to the place that is best for it, until none moves. What it ends with, and layouts
-that are given to begin with, are refined by scipy (Powell's method in the tilts of all cells).
+The exchange is that of optimal design of experiments (Fedorov 1972): from the best layout of one cell less, the best
+place for one more; then each cell in turn to the place that is best for it, until none moves. What it ends with, and
+layouts that are given to begin with, are refined by scipy (Powell's method in the tilts of all cells).
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -12,9 +12,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import minimize
 
+from css_design.errors import DesignError
 from css_design.layout.heading_error import HeadingError
 from css_design.layout.judge import LayoutJudge
 from css_design.layout.placements import allowed
+from css_design.layout.readings import Cells
 
 _FORBIDDEN = 1e6
 _STEP = 0.35  # [rad] by which the refinement moves a normal at the most
@@ -24,7 +26,7 @@ _ROUNDS = 8
 class Found(NamedTuple):
     """The best layout of a number of cells."""
 
-    normals_b: np.ndarray  # (N, 3)
+    cells: Cells
     error: HeadingError
     cost: float  # [deg]
 
@@ -40,28 +42,30 @@ class LayoutSearch:
         self,
         judge: LayoutJudge,
         faces: Sequence[np.ndarray],
-        places_b: np.ndarray,
+        places: Cells,
         tilt_deg: float,
         progress: Callable[[str], None] = lambda _: None,
     ) -> None:
-        """Reads all places (K, 3) once.
+        """Reads all places once.
 
         Args:
             tilt_deg: largest tilt of a cell from its face.
             progress: told what is searched.
         """
         self._judge, self._faces, self._tilt_deg = judge, faces, tilt_deg
-        free = [allowed(place[None], faces, tilt_deg, judge.clip_normal_b) for place in places_b]
-        self._places = places_b[free]
+        free = [allowed(place[None], faces, tilt_deg, judge.clip_normal_b) for place in places.normals_b]
+        self._places = places.chosen(np.flatnonzero(free).tolist())
+        if not self._places.count:
+            raise DesignError("--faces: no cell may be on them, as the body plane of the mission hides half of the sky")
         self._readings = judge.read(self._places)
         self._progress = progress
         self.best: dict[int, Found] = {}
 
-    def run(self, counts: Iterable[int], starts: Sequence[np.ndarray] = ()) -> None:
+    def run(self, counts: Iterable[int], starts: Sequence[Cells] = ()) -> None:
         """Searches layouts of each number of cells.
 
         Args:
-            starts: layouts (N, 3) to begin with, beside what the exchange finds.
+            starts: layouts to begin with, beside what the exchange finds.
         """
         chosen: list[int] = []
         for count in range(1, max(counts) + 1):
@@ -69,19 +73,19 @@ class LayoutSearch:
             chosen = self._exchanged([*chosen, 0])
             if count not in counts:
                 continue
-            self._keep(self._places[chosen])
-            for start in [self._places[chosen], *(s for s in starts if len(s) == count)]:
+            self._keep(self._places.chosen(chosen))
+            for start in [self._places.chosen(chosen), *(s for s in starts if s.count == count)]:
                 self._keep(start)
                 self._progress(f"{count} cells: refinement")
                 self._keep(self._refined(start))
 
-    def _keep(self, normals_b: np.ndarray) -> None:
-        if not allowed(normals_b, self._faces, self._tilt_deg, self._judge.clip_normal_b):
+    def _keep(self, cells: Cells) -> None:
+        if not allowed(cells.normals_b, self._faces, self._tilt_deg, self._judge.clip_normal_b):
             return
-        error = self._judge.error_of(normals_b)
-        found, known = Found(normals_b, error, self._judge.cost(error)), self.best.get(len(normals_b))
+        error = self._judge.error_of(cells)
+        found, known = Found(cells, error, self._judge.cost(error)), self.best.get(cells.count)
         if known is None or found.cost < known.cost:
-            self.best[len(normals_b)] = found
+            self.best[cells.count] = found
 
     def _cost(self, chosen: Sequence[int]) -> float:
         return self._judge.cost(self._judge.error(self._places, self._readings, chosen))
@@ -93,7 +97,7 @@ class LayoutSearch:
             before = cost
             for k in reversed(range(len(chosen))):
                 others = [*chosen[:k], *chosen[k + 1 :]]
-                costs = [self._cost([*others, place]) for place in range(len(self._places))]
+                costs = [self._cost([*others, place]) for place in range(self._places.count)]
                 best = int(np.argmin(costs))
                 if costs[best] < cost - 1e-9:
                     chosen, cost = [*others[:k], best, *others[k:]], costs[best]
@@ -101,20 +105,20 @@ class LayoutSearch:
                 break
         return chosen
 
-    def _refined(self, normals_b: np.ndarray) -> np.ndarray:
-        axes = [_across(normal) for normal in normals_b]
+    def _refined(self, cells: Cells) -> Cells:
+        axes = [_across(normal) for normal in cells.normals_b]
 
-        def moved(x: np.ndarray) -> np.ndarray:
-            shifted = np.array([n + a @ t for n, a, t in zip(normals_b, axes, x.reshape(-1, 2), strict=True)])
-            return shifted / np.linalg.norm(shifted, axis=1, keepdims=True)
+        def moved(x: np.ndarray) -> Cells:
+            shifted = np.array([n + a @ t for n, a, t in zip(cells.normals_b, axes, x.reshape(-1, 2), strict=True)])
+            return Cells(shifted / np.linalg.norm(shifted, axis=1, keepdims=True), cells.views_deg)
 
         def cost(x: np.ndarray) -> float:
-            normals = moved(x)
-            if not allowed(normals, self._faces, self._tilt_deg, self._judge.clip_normal_b):
+            tried = moved(x)
+            if not allowed(tried.normals_b, self._faces, self._tilt_deg, self._judge.clip_normal_b):
                 return _FORBIDDEN
-            return self._judge.cost(self._judge.error_of(normals))
+            return self._judge.cost(self._judge.error_of(tried))
 
-        size = 2 * len(normals_b)
+        size = 2 * cells.count
         found = minimize(
             cost,
             np.zeros(size),

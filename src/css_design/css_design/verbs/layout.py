@@ -7,7 +7,6 @@ import math
 import re
 import sys
 
-import numpy as np
 from rich.console import Console
 
 from css_analysis.readable_table import ReadableTable
@@ -15,11 +14,12 @@ from css_common import places
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import load_mission
 from css_design.errors import DesignError
-from css_design.layout.front import Point, error_object, front_of, write_missions
+from css_design.layout.front import Point, error_object, front_of, write_missions, write_own
 from css_design.layout.heading_error import HeadingError
 from css_design.layout.judge import Aims, LayoutJudge
 from css_design.layout.placements import TILTS_DEG, candidates, faces_of
 from css_design.layout.search import LayoutSearch
+from css_design.layout.structure import read_structure
 from css_sensors.cells import MOST_CELLS
 
 _COLUMNS = ("mean", "worst", "failed\nmean", "failed\nworst")
@@ -32,13 +32,18 @@ def run(options: argparse.Namespace) -> int:
     faces = faces_of(options.faces)
     mission = load_mission(options.mission, options.overrides)
     messages, console = Console(stderr=True, highlight=False), Console(highlight=False)
-    judge = LayoutJudge(mission, aims, options.pointing, options.prior)
-    own = np.asarray(mission.values.cells.normals)
+    structure = None if options.structure is None else read_structure(options.structure)
+    if structure is not None:
+        x, y, z = structure.extent
+        console.print(f"structure: {x:.3g} x {y:.3g} x {z:.3g} m, {len(structure.triangles)} triangles")
+    judge = LayoutJudge(mission, aims, options.pointing, options.prior, structure)
+    own = judge.own
+    views = sorted(set(options.views)) if options.views else sorted(set(own.views_deg.tolist()))
     tilts = sorted({min(tilt, options.tilt) for tilt in (*TILTS_DEG, options.tilt)})
     interrupted = False
     with messages.status("reading cells") as status:
         search = LayoutSearch(
-            judge, faces, candidates(faces, tilts), options.tilt, lambda what: _tell(messages, status, what)
+            judge, faces, candidates(faces, tilts, views), options.tilt, lambda what: _tell(messages, status, what)
         )
         try:
             search.run(counts, [own])
@@ -48,10 +53,13 @@ def run(options: argparse.Namespace) -> int:
         print("layout: interrupted before the first layout", file=sys.stderr)
         return INTERRUPTED
     folder = options.out or places.results("layouts") / mission.name
-    written, refused = ({}, []) if options.no_missions else write_missions(mission, search.best, folder)
+    written, refused = ({}, []) if options.no_missions else write_missions(mission, search.best, judge.blocked, folder)
     points = front_of(search.best, written)
-    own_error = judge.error_of(own)
-    _print(points, len(own), own_error, judge.cost(own_error), console)
+    own_error = judge.error_of(own, judge.own_blocked)
+    if written and structure is not None:
+        written_own = write_own(mission, own, judge.own_blocked, folder)
+        console.print(f"the mission's own cells with what the structure blocks: {written_own}", soft_wrap=True)
+    _print(points, own.count, own_error, judge.cost(own_error), console)
     for line in refused:
         print(f"layout: warning: {line}", file=sys.stderr)
     if written:
@@ -59,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         result = {
             "mission": mission.name,
-            "own": {"cells": len(own), **error_object(own_error), "cost_deg": judge.cost(own_error)},
+            "own": {"cells": own.count, **error_object(own_error), "cost_deg": judge.cost(own_error)},
             "front": [point.as_object() for point in points],
             "weights": aims._asdict(),
             "pointing": options.pointing,
@@ -96,7 +104,7 @@ def _aims(text: str) -> Aims:
     except ValueError:
         weights = []
     if len(weights) != 3 or not all(0.0 <= w < math.inf for w in weights) or not any(weights):
-        raise DesignError(f"--weights: {text} given, expected three numbers, at least 0 and not all of them, as 1,0.1,0.5")
+        raise DesignError(f"--weights: {text} given, expected three numbers from 0 on, such as 1,0.1,0.5")
     return Aims(*weights)
 
 
@@ -110,7 +118,7 @@ def _print(points: list[Point], own_cells: int, own: HeadingError, own_cost: flo
     table.add_number("on the\nfront")
     table.add_texts([f"{own_cells} as they are", *_figures(own), f"{own_cost:.2f}", ""])
     for point in points:
-        count = len(point.found.normals_b)
+        count = point.found.cells.count
         front = "yes" if point.on_front else "no"
         table.add_texts([f"{count}", *_figures(point.found.error), f"{point.found.cost:.2f}", front])
     console.print(table)
