@@ -24,7 +24,9 @@ def summed_inertia(masses_and_points):
     middle = masses @ points / masses.sum()
     off = points - middle
     squares = np.sum(off**2, axis=1)
-    return np.einsum("i,ijk->jk", masses, squares[:, None, None] * np.eye(3) - off[:, :, None] * off[:, None, :]), middle
+    return np.einsum(
+        "i,ijk->jk", masses, squares[:, None, None] * np.eye(3) - off[:, :, None] * off[:, None, :]
+    ), middle
 
 
 def test_a_box_has_the_inertia_of_a_box():
@@ -40,8 +42,8 @@ def test_panels_add_their_masses_where_they_are():
     first, second = PANEL_DENSITY * 0.3 * 0.34, PANEL_DENSITY * 0.2 * 0.2
     parts = [
         (6.0 - first - second, points_of_box(SIZE)),
-        (first, points_of_box((0.0, 0.3, 0.34)) + (0.05, 0.25, 0.0)),
-        (second, points_of_box((0.0, 0.2, 0.2)) + (0.05, 0.0, -0.27)),
+        (first, points_of_box((0.0, 0.3, 0.34)) + np.array([0.05, 0.25, 0.0])),
+        (second, points_of_box((0.0, 0.2, 0.2)) + np.array([0.05, 0.0, -0.27])),
     ]
     summed, middle = summed_inertia(parts)
     assert np.allclose(inertia, summed, rtol=3e-3, atol=1e-6)  # of small cubes, each with an inertia of its own
@@ -60,7 +62,8 @@ def test_plates_close_the_box_and_have_two_sides_each():
 
 
 @pytest.mark.parametrize(
-    "word", ["+y:+x", "+y:+y:0.3", "+q:+x:0.3", "+y:0/1/1:0.3", "+y:+x:-1", "+y:+x:nan", "+y:+x:0.3:99", "+y:+x:0.3:1:2"]
+    "word",
+    ["+y:+x", "+y:+y:0.3", "+q:+x:0.3", "+y:0/1/1:0.3", "+y:+x:-1", "+y:+x:nan", "+y:+x:0.3:99", "+y:+x:0.3:1:2"],
 )
 def test_what_is_no_panel_is_refused(word):
     with pytest.raises(DesignError, match=r"--panels: .*expected"):

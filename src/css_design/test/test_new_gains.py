@@ -8,9 +8,9 @@ import pytest
 
 from css_common.component import Smoothing
 from css_design.errors import DesignError
+from css_design.new_mission.design import substeps_of
 from css_design.new_mission.gains import DAMPING, LEAST_MARGIN_DB, Capacity, capacity, designed, gain_margin_db
 from css_sim.rigid_body import LARGEST_ANGLE
-from css_design.new_mission.design import substeps_of
 from sunpoint_control.loop_stability import Gains, LoopModel
 
 INERTIA = np.diag([0.05, 0.04, 0.02])
@@ -21,7 +21,7 @@ def model(period=0.1, rate=1.0):
 
 
 def test_three_wheels_do_in_every_direction_what_one_does():
-    assert capacity(np.eye(3), 0.002, 0.01) == Capacity(pytest.approx(0.002), pytest.approx(0.01))
+    assert capacity(np.eye(3), 0.002, 0.01) == pytest.approx((0.002, 0.01))
 
 
 def test_capacity_is_the_least_over_all_directions():

@@ -119,7 +119,7 @@ def _row(source: str, square: float, split: Split, total: float) -> Row:
 
 
 def remark_on(predicted: float, split: Split, total: float) -> str:
-    """Words where propagation and Monte Carlo disagree, or the Monte Carlo with itself [rad]; empty where they agree."""
+    """Words where propagation and Monte Carlo disagree, or the Monte Carlo with itself; empty where they agree."""
     alone, left_out = split
     least = math.sqrt(_MATTERS) * total
     words = []

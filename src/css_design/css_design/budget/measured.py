@@ -79,7 +79,9 @@ def fly(missions: dict[str, Mission], cases: int, tell: Tell) -> dict[str, Error
     done, total = 0, cases * len(flights)
     results: dict[str, list[Errors]] = {name: [] for name in flights}
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
-        futures = [(name, len(part), pool.submit(_fly, flight, part)) for name, flight in flights.items() for part in numbers]
+        futures = [
+            (name, len(part), pool.submit(_fly, flight, part)) for name, flight in flights.items() for part in numbers
+        ]
         try:
             for name, count, future in futures:
                 results[name].append(future.result())
@@ -187,8 +189,6 @@ def split(flown: dict[str, Errors], active: Sequence[Source], kind: str) -> dict
     if EVERYWHERE not in flown:
         found[FILTER] = Split(root_mean_square(of(NONE)), nothing)
         return found
-    found[LAYOUT] = Split(
-        root_mean_square(of(NONE), of(EVERYWHERE)), root_mean_square(of(ALL), of(ALL_EVERYWHERE))
-    )
+    found[LAYOUT] = Split(root_mean_square(of(NONE), of(EVERYWHERE)), root_mean_square(of(ALL), of(ALL_EVERYWHERE)))
     found[FILTER] = Split(root_mean_square(of(EVERYWHERE)), nothing)
     return found

@@ -88,7 +88,9 @@ def readings(flight: MissionFlight, path: Path, cells: np.ndarray | None = None)
         bool(vehicle.heading_hears_wheels),
     )
     key = random_key(flight.mission.values.mission.seed, path.case)
-    room = CellsOfCase(tables.cells[0] if cells is None else cells, tables.faults[0], np.zeros(of_cells), new_workspace())
+    room = CellsOfCase(
+        tables.cells[0] if cells is None else cells, tables.faults[0], np.zeros(of_cells), new_workspace()
+    )
     case = SensorsOfCase(
         key,
         room,
@@ -101,7 +103,7 @@ def readings(flight: MissionFlight, path: Path, cells: np.ndarray | None = None)
     field_b = np.zeros(3)
     for begin, end in _blocks(count):
         around = flight.surroundings.block(begin, end - begin)
-        part = Measured(*(array[begin:end] for array in measured[:6]), measured.wheels_valid)
+        part = _rows(measured, begin, end)
         _sense_along(vehicle, tables, case, begin, around, path.truth[begin:end], field_b, part)
     return measured
 
@@ -116,9 +118,7 @@ def _sense_along(v: Vehicle, cases: Cases, case: SensorsOfCase, first: int, arou
     """
     for k in range(truth.shape[0]):
         environment = state_at(around.states, k)
-        rotation = RotationState(
-            (truth[k, 0], truth[k, 1], truth[k, 2]), (truth[k, 3], truth[k, 4], truth[k, 5])
-        )
+        rotation = RotationState((truth[k, 0], truth[k, 1], truth[k, 2]), (truth[k, 3], truth[k, 4], truth[k, 5]))
         dcm_bn = mrp_to_dcm(rotation.sigma_bn)
         light = around.light[min(k, around.light.shape[0] - 1)]
         if v.own_earth:
@@ -138,7 +138,8 @@ def _sense_along(v: Vehicle, cases: Cases, case: SensorsOfCase, first: int, arou
 def estimates(flight: MissionFlight, path: Path, measured: Measured) -> Estimates:
     """What the estimator of a mission makes of readings along a path."""
     vehicle, _ = _first_stretch(flight, path.case)
-    algorithm: Any = getattr(flight.mission.node(flight.mission.values.graph.estimator).component, "algorithm")  # noqa: B009
+    component: Any = flight.mission.node(flight.mission.values.graph.estimator).component
+    algorithm = component.algorithm
     p = vehicle.heading
     state, memory = watched.initial_state(algorithm, p), watched.initial_memory(algorithm, p)
     advance = loop_of(algorithm.step.__module__)
@@ -146,11 +147,17 @@ def estimates(flight: MissionFlight, path: Path, measured: Measured) -> Estimate
     sun_b, known = np.zeros((len(path.truth), 3)), np.zeros(len(path.truth), bool)
     for begin, end in _blocks(len(path.truth)):
         around = flight.surroundings.block(begin, end - begin)
-        part = Measured(*(array[begin:end] for array in measured[:6]), measured.wheels_valid)
+        part = _rows(measured, begin, end)
         out = new_headings(end - begin)
         state = advance(p, state, memory, since_s[: end - begin], part, around.sky, around.sky_light, out)
         sun_b[begin:end], known[begin:end] = out.sun_b, out.validity != VALIDITY_NONE
     return Estimates(sun_b, known)
+
+
+def _rows(measured: Measured, begin: int, end: int) -> Measured:
+    """Some of the cycles."""
+    arrays = {name: value[begin:end] for name, value in measured._asdict().items() if isinstance(value, np.ndarray)}
+    return measured._replace(**arrays)
 
 
 def cells_of_case(flight: MissionFlight, case: int) -> np.ndarray:

@@ -34,6 +34,7 @@ from css_design.budget.sources import (
 from css_design.budget.turning import Follower
 from css_estimation.sun.sun_heading import Measured
 from css_monte_carlo.mission_flight import MissionFlight
+from css_monte_carlo.mission_parts import parts_of
 from css_sim import gyro as gyro_model
 from css_sim import magnetometer as magnetometer_model
 from css_sim.cell_errors import error_model, tilted
@@ -137,7 +138,7 @@ def propagate(mission: Mission, cases: int, tell: Tell) -> Propagated:
 
 
 def rayleigh_percentile(squares: np.ndarray, share: float) -> float:
-    """Angle [rad] below which a share of errors lies whose mean squares at each step are given, the same on two axes."""
+    """Angle [rad] below which a share of errors lies, by their mean squares at each step [rad^2], alike on two axes."""
     if not len(squares) or not np.any(squares > 0.0):
         return float("nan") if not len(squares) else 0.0
     low, high = 0.0, 10.0 * float(np.sqrt(np.max(squares)))
@@ -168,8 +169,6 @@ def _sources(mission: Mission, ideal: Mission, along: _Along) -> Iterator[tuple[
 
 
 def _name_of(mission: Mission, part: str) -> str:
-    from css_monte_carlo.mission_parts import parts_of
-
     return str(getattr(parts_of(mission), part).name)
 
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Splits the heading and pointing error of a mission or a recording by what makes it.
 
-Of a mission: each source by linearised propagation through the estimator, and by a Monte Carlo with the source alone and
-with all but it; root mean squares, the bound of 95 % with its confidence, and where the two disagree. Of a recording: what each
-source of the mission in it made in that flight.
+Of a mission: each source by linearised propagation through the estimator, and by a Monte Carlo with the source alone
+and with all but it; root mean squares, the bound of 95 % with its confidence, and where the two disagree. Of a
+recording: what each source of the mission in it made in that flight.
 """
 
 import signal
@@ -12,11 +12,10 @@ from collections.abc import Sequence
 
 from css_common.command import CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
+from css_design.budget.case_counts import CASES, QUICK_CASES
 from css_design.errors import DesignError
 from css_monte_carlo.errors import StudyError
 from css_recording.errors import BagError
-
-CASES, QUICK_CASES = 40, 8
 
 _EXAMPLES = ("okeefe_2013", "mysat.yaml --cases 200 --json", "cubesat_3u_sun_filter --quick", "bags/first")
 _EXITS = {0: "done", 1: "done, but cases or the nominal flights never acquired the Sun"}

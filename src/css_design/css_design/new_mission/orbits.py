@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from css_common.epochs import format_utc, parse_utc
+from css_design.errors import DesignError
 from css_environment.constants import EARTH_J2, EARTH_MU, EARTH_RADIUS
 from css_environment.tle_checks import format_faults
-from css_design.errors import DesignError
 
 DEFAULT_EPOCH = "2026-06-01T00:00:00Z"
 

@@ -13,8 +13,9 @@ from css_analysis.readable_table import ReadableTable
 from css_common.mission import load_mission
 from css_common.preflight import preflight, report, reported
 from css_design.budget.budget import Budget, Part, Row, budget_of
+from css_design.budget.case_counts import CASES, QUICK_CASES
 from css_design.budget.measured import Estimate
-from css_design.commands.budget import CASES, QUICK_CASES
+from css_design.budget.recorded import Recorded, recorded_budget
 from css_design.errors import DesignError
 from css_monte_carlo.progress import progress_bar
 
@@ -27,8 +28,8 @@ def run(options: argparse.Namespace) -> int:
     cases = options.cases if options.cases is not None else QUICK_CASES if options.quick else CASES
     if not 2 <= cases <= _MOST_CASES:
         raise DesignError(f"--cases: {cases} given, expected 2 to {_MOST_CASES}")
-    if Path(options.what).is_dir():
-        return 2
+    if Path(options.what).is_dir() or options.what.endswith(".mcap"):
+        return _of_recording(options)
     overrides = list(options.overrides)
     if options.duration is not None:
         overrides.append(f"mission.duration={options.duration}")
@@ -50,12 +51,80 @@ def run(options: argparse.Namespace) -> int:
     return 0 if budget.acquired == budget.cases else 1
 
 
+def _of_recording(options: argparse.Namespace) -> int:
+    """The budget of a flight that was recorded."""
+    if options.overrides or options.duration is not None or options.cases is not None:
+        raise DesignError("--cases, --duration, --set: given with a recording, which flew as it did; expected none")
+    found = recorded_budget(Path(options.what))
+    console = Console(highlight=False)
+    console.print(
+        f"{found.origin}: {found.mission}, case {found.case}, {found.estimator}: heading error over "
+        f"{found.counted_s:.0f} s of sunlight after acquisition, root mean square",
+        soft_wrap=True,
+    )
+    table = ReadableTable()
+    table.add_name("source")
+    table.add_number("alone\n[deg]")
+    table.add_number("left out\n[deg]")
+    for row in found.rows:
+        table.add_texts([row.source, _number(row.alone), _number(row.left_out)])
+    summed = math.sqrt(sum(row.alone**2 for row in found.rows if math.isfinite(row.alone)))
+    table.add_texts(["root sum square", _number(summed), ""])
+    table.add_texts(["recorded", _number(found.total), ""])
+    console.print(table)
+    console.print(f" heading, 95 % of the errors below {_interval(found.bound)} deg", soft_wrap=True)
+    console.print(
+        f" pointing, root mean square {_number(found.pointing_total)} deg, 95 % below "
+        f"{_interval(found.pointing_bound)} deg",
+        soft_wrap=True,
+    )
+    for remark in found.remarks:
+        console.print(f"remark: {remark}", soft_wrap=True)
+    if options.json:
+        print(json.dumps(recorded_object(found, summed), allow_nan=False))
+    return 1 if found.remarks else 0
+
+
+def recorded_object(found: Recorded, summed: float) -> dict[str, Any]:
+    """What `--json` prints of a recording."""
+    return {
+        "recording": found.origin,
+        "mission": found.mission,
+        "case": found.case,
+        "estimator": found.estimator,
+        "counted_s": found.counted_s,
+        "heading": {
+            "sources": [
+                {"source": row.source, "alone_deg": _known(row.alone), "left_out_deg": _known(row.left_out)}
+                for row in found.rows
+            ],
+            "root_sum_square_alone_deg": summed,
+            "total_deg": found.total,
+            "bound_95_deg": found.bound.value,
+            "bound_95_confidence_deg": _pair(found.bound),
+        },
+        "pointing": {
+            "total_deg": found.pointing_total,
+            "bound_95_deg": found.pointing_bound.value,
+            "bound_95_confidence_deg": _pair(found.pointing_bound),
+        },
+        "remarks": found.remarks,
+        "warnings": reported(),
+    }
+
+
 def _print(budget: Budget, console: Console) -> None:
     for part in budget.parts:
-        console.print(_table(budget, part))
+        console.print(
+            f"{budget.mission}, {budget.estimator}: {part.name} error in sunlight after acquisition, root mean "
+            f"square, {budget.acquired} of {budget.cases} cases",
+            soft_wrap=True,
+        )
+        console.print(_table(part))
         console.print(
             f" {part.name}, 95 % of the errors below {_interval(part.bound)} deg"
-            + (f"; predicted {part.predicted_bound:.2f}" if math.isfinite(part.predicted_bound) else "")
+            + (f"; predicted {part.predicted_bound:.2f}" if math.isfinite(part.predicted_bound) else ""),
+            soft_wrap=True,
         )
         for row in part.rows:
             if row.remark:
@@ -65,11 +134,8 @@ def _print(budget: Budget, console: Console) -> None:
         console.print(f"remark: {remark}", soft_wrap=True)
 
 
-def _table(budget: Budget, part: Part) -> ReadableTable:
-    table = ReadableTable(
-        f"{budget.mission}, {budget.estimator}: {part.name} error in sunlight after acquisition, root mean square, "
-        f"{budget.acquired} of {budget.cases} cases"
-    )
+def _table(part: Part) -> ReadableTable:
+    table = ReadableTable()
     table.add_name("source")
     for heading in ("predicted\n[deg]", "measured\nalone\n[deg]", "95 %", "left out\n[deg]", "predicted/\nalone"):
         table.add_number(heading)
