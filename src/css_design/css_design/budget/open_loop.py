@@ -156,8 +156,17 @@ def estimates(flight: MissionFlight, path: Path, measured: Measured) -> Estimate
 
 def _rows(measured: Measured, begin: int, end: int) -> Measured:
     """Some of the cycles."""
-    arrays = {name: value[begin:end] for name, value in measured._asdict().items() if isinstance(value, np.ndarray)}
-    return measured._replace(**arrays)
+    voltages, gyro_b, gyro_valid, field_b, field_valid, wheel_speeds, wheels_valid = measured
+    rows = slice(begin, end)
+    return Measured(
+        voltages[rows],
+        gyro_b[rows],
+        gyro_valid[rows],
+        field_b[rows],
+        field_valid[rows],
+        wheel_speeds[rows],
+        wheels_valid,
+    )
 
 
 def cells_of_case(flight: MissionFlight, case: int) -> np.ndarray:
