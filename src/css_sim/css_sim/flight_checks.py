@@ -17,9 +17,12 @@ from css_common.sections import (
     INERTIA,
     ORBIT_SOURCE,
     PERIOD,
+    ROD_AXES,
+    ROD_MAX_DIPOLE,
     RODS_FITTED,
     WHEEL_INERTIA,
     WHEEL_MAX_SPEED,
+    WHEEL_MAX_TORQUE,
     WHEELS_FITTED,
     of_each_wheel,
     wheel_axes,
@@ -28,7 +31,7 @@ from css_common.vectors import Vec3
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.orbit_checks import field_findings, orbit_findings
 from css_sim import initial_conditions
-from css_sim.disturbances import DIPOLE, GRAVITY_GRADIENT
+from css_sim.disturbances import DIPOLE, GRAVITY_GRADIENT, TORQUE
 from css_sim.flight_environment import GEOMAGNETIC_FIELD
 from css_sim.initial_conditions import FIXED_RATE, MAX_RATE, RATE, WHEEL_SPEEDS, has_dipole
 
@@ -69,6 +72,7 @@ def plant_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
         yield from field_findings(values)
     yield from _rate_findings(values)
     yield from _swing_findings(values)
+    yield from _torque_findings(values)
     if values[WHEELS_FITTED]:
         controlled = any(
             output.topic == "wheels/torque_command" for other in graph.values() for output in other.outputs
@@ -135,6 +139,29 @@ def _swing_findings(values: Values) -> Iterator[Finding]:
                 f"mission.period: {period:g} given, over which the torque of {key} is held: that alone lets a "
                 f"swing about it grow by up to a factor of {math.exp(min(growth, 700.0)):.3g} in the flight, expected "
                 f"at most {period * _PUMPED / growth:.2g} s"
+            )
+
+
+def _torque_findings(values: Values) -> Iterator[Finding]:
+    """Torques that within one cycle, in which nobody commands another, turn the body as no spacecraft turns."""
+    period, smallest = values[PERIOD], float(np.linalg.eigvalsh(values[INERTIA])[0])
+    torques = {"disturbances.torque": float(np.linalg.norm(values[TORQUE]))}
+    if values[WHEELS_FITTED]:
+        axes = wheel_axes(values)
+        together = float(np.linalg.norm(axes, 2)) * math.sqrt(len(axes))  # no torques of +-1 along them sum up to more
+        torques["wheels.max_torque"] = values[WHEEL_MAX_TORQUE] * together
+    if values[RODS_FITTED]:
+        dipole = values[ROD_MAX_DIPOLE] * math.sqrt(len(values[ROD_AXES]))
+        torques["rods.max_dipole"] = dipole * _FIELD_AT_GROUND
+    for key, torque in torques.items():
+        faster = torque / smallest * period
+        if faster > FASTEST or 0.5 * faster * period > _FARTHEST_TURN:
+            shown = f"{math.degrees(faster):.3g} deg/s" if faster < math.inf else "without bound"
+            yield Finding(
+                f"{key}: up to {torque:.3g} N m given, which in a cycle of {period:g} s makes a body of "
+                f"{smallest:.3g} kg m^2 faster by {shown}, expected at most "
+                f"{min(FASTEST, 2.0 * _FARTHEST_TURN / period) * smallest / period:.3g} N m",
+                refused=faster > FASTEST,
             )
 
 

@@ -14,6 +14,7 @@ from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
 from sunpoint_control.wheel_allocation import pseudo_inverse
 
 _ALIKE = 0.01  # relative difference of two low-passes that are one
+_FARTHEST_TURN = 0.5  # [rad] of a reference that spins, between two cycles
 
 
 def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
@@ -35,9 +36,31 @@ def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]
             f"dumping.momentum: takes {fastest:.0f} rpm of a wheel, expected at most wheels.max_speed_rpm "
             f"{limits[worst]:g}"
         )
+    yield from _dumping_findings(values)
+    turned_in_cycle = abs(values.reference.spin_deg_s) * model.period
+    if turned_in_cycle > math.degrees(_FARTHEST_TURN):
+        yield Finding(
+            f"reference.spin_deg_s: {values.reference.spin_deg_s:g} given, {turned_in_cycle:.0f} deg in a cycle of "
+            f"{model.period:g} s, expected at most {math.degrees(_FARTHEST_TURN) / model.period:.3g}: what samples "
+            "once a cycle cannot follow"
+        )
     yield from _low_pass_finding(values, model)
     gains = Gains(values.gains.k, values.gains.p, values.gains.ki)
     yield from gain_findings(model, gains, _setting(values, model))
+
+
+def _dumping_findings(values: Values) -> Iterator[Finding]:
+    """Speeds go as Omega_k+1 = (1 - c h) Omega_k: they ring from c h = 1 on, and grow beyond 2."""
+    share = values.dumping.gain * values.mission.period
+    if not values.dumping.enabled or not values.rods.fitted or share < 1.0:
+        return
+    most = 1.0 / values.mission.period
+    yield Finding(
+        f"dumping.gain: {values.dumping.gain:g} given, {share:.3g} of a wheel's momentum in a cycle of "
+        f"{values.mission.period:g} s, expected less than {most:.3g}: "
+        + ("the speeds grow" if share > 2.0 else "the speeds ring"),
+        refused=share > 2.0,
+    )
 
 
 def _low_pass_finding(values: Values, model: LoopModel) -> Iterator[Finding]:

@@ -48,7 +48,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # a killed terminal or `kill` end it as Ctrl-C does
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     run = implementation("css_design.verbs.new")
-    return guarded(parser.prog, lambda: run(options), (DesignError, OSError), interrupted="interrupted; nothing written")
+    return guarded(
+        parser.prog, lambda: run(options), (DesignError, OSError), interrupted="interrupted; nothing written"
+    )
 
 
 if __name__ == "__main__":

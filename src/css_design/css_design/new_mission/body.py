@@ -110,7 +110,7 @@ def plates_of(size: Vector, box_centre: np.ndarray, panels: tuple[Panel, ...]) -
     ]
     for panel in panels:
         area, _, centre = _placed(box, panel)
-        back = tuple(-part for part in panel.normal)
-        rows += [(area, panel.normal, box_centre + centre), (area, back, box_centre + centre)]
+        x, y, z = panel.normal
+        rows += [(area, panel.normal, box_centre + centre), (area, (-x, -y, -z), box_centre + centre)]
     areas, normals, centres = zip(*rows, strict=True)
     return Plates(np.array(areas), np.array(normals) + 0.0, np.array(centres))

@@ -24,7 +24,7 @@ def parameter_file(heading: str, sections: Iterable[tuple[str, Sequence[Entry]]]
         heading: what stands above it, paragraphs with empty lines between.
         sections: name of a section and its entries; keys of one branch stand together.
     """
-    lines = []
+    lines: list[str] = []
     for paragraph in heading.split("\n\n"):
         lines += ["#"] if lines else []
         lines += [f"# {line}" for line in textwrap.wrap(paragraph, _WIDTH - 2)]

@@ -129,9 +129,7 @@ def _estimator(asked: Mapping[str, Any], has_wheels: bool) -> str:
     return "sun_filter" if has_wheels else "wls"
 
 
-def _array_normal(
-    asked: Mapping[str, Any], panels: tuple[Panel, ...], inertia: np.ndarray, spun: bool
-) -> Vector:
+def _array_normal(asked: Mapping[str, Any], panels: tuple[Panel, ...], inertia: np.ndarray, spun: bool) -> Vector:
     if asked["array_normal"] != "auto":
         try:
             return direction(asked["array_normal"])

@@ -92,9 +92,7 @@ ITEMS = (
     Item("rods", "A m^2", "torque rods along the axes: dipole of each", f"M|{NONE}", optional(number(1e-4, 1e4))),
     Item("gyro", "deg/s", "gyro: noise of a sample, 1 sigma", f"S|{NONE}", optional(number(0.0, 100.0))),
     Item("gyro_bias", "deg/h", "its bias, 1 sigma", "B", number(0.0, 1e5)),
-    Item(
-        "magnetometer", "nT", "magnetometer: noise of a sample, 1 sigma", f"S|{NONE}", optional(number(0.0, 1e5))
-    ),
+    Item("magnetometer", "nT", "magnetometer: noise of a sample, 1 sigma", f"S|{NONE}", optional(number(0.0, 1e5))),
     Item("field_of_view", "deg", "full cone of view of a cell", "A", number(10.0, 180.0)),
     Item("cell_noise", "-", "noise of a cell, 1 sigma, of full Sun", "S", number(0.0, 0.3)),
     Item("cell_bits", "bits", "converter of the cells, over twice the full Sun; 0: continuous", "N", number(0, 24)),

@@ -171,8 +171,7 @@ def _estimator(design: Design) -> Iterator[Entry]:
         if asked["gyro"] is not None:
             yield Entry("gyro.noise_deg_s", min(asked["gyro"], 10.0), "[computed] that of the gyro")
             yield Entry("gyro.bias_deg_h", asked["gyro_bias"], "[computed] likewise")
-        if not len(design.wheel_axes) or asked["gyro"] is None:
-            yield from _field_of_filter(design)
+        yield from _field_of_filter(design)
     if asked["gyro"] is None and name != "sun_filter":
         yield Entry("use_gyro", False)
     if asked["gyro"] is None and asked["magnetometer"] is not None and name not in ("sun_filter",):

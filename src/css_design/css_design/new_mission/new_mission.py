@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """From what was asked to a mission that every check has passed."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from css_common.mission import Mission, mission_from_text
 from css_common.mission_file import MissionError
@@ -13,6 +16,8 @@ from css_design.new_mission.items import ITEMS
 from css_design.new_mission.mission_text import mission_text
 from css_design.new_mission.templates import TEMPLATES
 from sunpoint_control.control_checks import loop_model
+
+_DIRECTIONS = 4000
 
 
 class NewMission(NamedTuple):
@@ -58,4 +63,19 @@ def new_mission(name: str, asked: Mapping[str, Any], origin: Mapping[str, str]) 
         warnings = preflight(mission)
     except MissionError as error:
         raise DesignError(str(error).removeprefix(f"{place}: ")) from error
-    return NewMission(known, mission_text(known), mission, tuple(warnings))
+    return NewMission(known, mission_text(known), mission, (*warnings, *_blind(known)))
+
+
+def _blind(known: Design) -> Iterator[str]:
+    """A warning for cells that leave part of the sky unseen."""
+    index = np.arange(_DIRECTIONS) + 0.5
+    z, azimuth = 1.0 - 2.0 * index / _DIRECTIONS, np.pi * (3.0 - np.sqrt(5.0)) * index
+    across = np.sqrt(1.0 - z**2)
+    sky = np.stack([across * np.cos(azimuth), across * np.sin(azimuth), z], axis=1)
+    seen = sky @ np.array(known.normals).T > math.cos(math.radians(0.5 * known.asked["field_of_view"]))
+    unseen = float(np.mean(~seen.any(axis=1)))
+    if unseen > 0.0:
+        yield (
+            f"--cells: no cell sees {100.0 * unseen:.1f} % of the sky, where the Sun is looked for by turning: "
+            "expected cells that look all around"
+        )

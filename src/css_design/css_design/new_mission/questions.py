@@ -12,7 +12,9 @@ _OF_WHEELS = ("wheel_momentum", "wheel_torque", "wheel_speed")
 _OF_GYRO = ("gyro_bias",)
 
 
-def ask(given: Mapping[str, str], template: str, read_line: Callable[[str], str], say: Callable[[str], None]) -> dict[str, str]:
+def ask(
+    given: Mapping[str, str], template: str, read_line: Callable[[str], str], say: Callable[[str], None]
+) -> dict[str, str]:
     """Answers for the items that nobody gave; those left empty are not among them.
 
     Args:
@@ -36,9 +38,7 @@ def ask(given: Mapping[str, str], template: str, read_line: Callable[[str], str]
 
 def _is_idle(item: Item, known: Mapping[str, str]) -> bool:
     """Whether it is about something that the spacecraft does not have."""
-    return (item.name in _OF_WHEELS and known["wheels"] == NONE) or (
-        item.name in _OF_GYRO and known["gyro"] == NONE
-    )
+    return (item.name in _OF_WHEELS and known["wheels"] == NONE) or (item.name in _OF_GYRO and known["gyro"] == NONE)
 
 
 def _answer(item: Item, default: str, read_line: Callable[[str], str], say: Callable[[str], None]) -> str:

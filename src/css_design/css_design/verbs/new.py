@@ -52,7 +52,9 @@ def _path(options: argparse.Namespace) -> Path:
     if name is None:
         raise DesignError("NAME: missing, expected a name for the mission, or --list")
     if name != name_for_files(name) or name.endswith(_SUFFIXES):
-        raise DesignError(f"NAME: {name!r} given, expected a name for files such as {name_for_files(Path(name).stem)!r}")
+        raise DesignError(
+            f"NAME: {name!r} given, expected a name for files such as {name_for_files(Path(name).stem)!r}"
+        )
     path = options.out or Path(f"{name}.yaml")
     if path.suffix not in _SUFFIXES:
         raise DesignError(f"--out: {path} given, expected a file that ends in .yaml")
@@ -90,7 +92,8 @@ def _tell(made: NewMission, path: Path) -> None:
             f"  gains              k {loop.gains.k:g} N m, p {loop.gains.p:g} N m s: bandwidth "
             f"{loop.bandwidth / (2.0 * math.pi):.3g} Hz, limited by {loop.limit}"
         )
-        print(f"  margin             {loop.margin_db:.1f} dB of gain; a small error falls to 2 % in {loop.settling_s:.0f} s")
+        settling = f"a small error falls to 2 % in {loop.settling_s:.0f} s"
+        print(f"  margin             {loop.margin_db:.1f} dB of gain; {settling}")
     print(f"  integration        {design.substeps} steps a cycle of {design.asked['period']:g} s at the first rate")
     assumed = [item.flag for item in ITEMS if design.origin[item.name] in TEMPLATES]
     if assumed:
