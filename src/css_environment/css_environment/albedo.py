@@ -28,7 +28,7 @@ import numpy as np
 
 from css_common.direction_grid import grid_cell
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, dot, multiply, multiply_transposed, unit
+from css_common.vectors import Mat3, Vec3, dot, multiply, multiply_transposed, scale, unit
 from css_environment.earth_light import (
     DISC,
     DISC_COS,
@@ -131,6 +131,36 @@ def transmission(screen: Screen, side: float, direction_b: Vec3) -> float:
 
 
 @kernel
+def _output_of_one(light, normal_b: Vec3, side: float, i: int, screen: Screen, edge: float, dcm_bn: Mat3) -> float:
+    """The same sum as of `albedo_output` for a cell with a view of its own, patch by patch."""
+    edge_sin = max(NARROWEST_SIN, math.sqrt(max(0.0, 1.0 - edge * edge)))
+    hidden = side != 0.0 and dot(screen.axis_b, screen.axis_b) > 0.0
+    axis_b = scale(1.0 if side > 0.0 else -1.0, screen.axis_b)
+    shift = dot(normal_b, axis_b)
+    middle = 0.5 * (screen.full_cos + screen.dark_cos)
+    screen_sin = math.sqrt(max(0.0, 1.0 - middle * middle))
+    ramp = 0.5 * (screen.full_cos - screen.dark_cos)
+    total = 0.0
+    for j in range(PATCHES):
+        if not light[LIGHT + j] > 0.0:
+            continue
+        direction_b = multiply(dcm_bn, (float(light[X + j]), float(light[Y + j]), float(light[Z + j])))
+        if is_blocked(screen, i, unit(direction_b)):
+            continue
+        part, moved = 1.0, 0.0
+        if hidden:
+            size2 = (float(light[SIZE + j]) * screen_sin) ** 2
+            inverse = 1.0 / math.sqrt(size2 + ramp * ramp)
+            part = min(max(0.5 + 0.5 * (dot(axis_b, direction_b) - middle) * inverse, 0.0), 1.0)
+            moved = (1.0 - part) * size2 * inverse
+        mean, width = dot(normal_b, direction_b) + moved * shift, float(light[SIZE + j]) * edge_sin
+        high = mean + width
+        low = min(max(mean - width, edge), high)
+        total += part * float(light[LIGHT + j]) * (high - low) * (high + low)
+    return total / edge_sin
+
+
+@kernel
 def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Mat3, work, output) -> None:
     """Light of the Earth that each cell receives [-], 1.0 being the Sun at normal incidence at 1 AU.
 
@@ -146,6 +176,12 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
     if light[DISC + DISC_LIGHT] <= 0.0:
         for i in range(output.shape[0]):
             output[i] = 0.0
+        return
+    if screen.views.shape[0] > 0 or screen.blocked.shape[0] > 0:
+        for i in range(output.shape[0]):
+            cell, edge_cos = cells[i], view_cosine(screen, i, cos_half_view)
+            normal_b = (float(cell.nx), float(cell.ny), float(cell.nz))
+            output[i] = _output_of_one(light, normal_b, float(cell.side), i, screen, edge_cos, dcm_bn)
         return
     nadir_n = (float(light[DISC]), float(light[DISC + 1]), float(light[DISC + 2]))
     sin_half_view = math.sqrt(max(0.0, 1.0 - cos_half_view * cos_half_view))
@@ -179,12 +215,6 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
     # A patch spreads over cosines mean - width to mean + width; those above the edge of the cone count.
     edge, spread = _F(cos_half_view), _F(edge_sin)
     for i in range(output.shape[0]):
-        if screen.views.shape[0] > 0:
-            own = screen.views[i]
-            own_sin = math.sqrt(max(0.0, 1.0 - own * own))
-            reach_cos = own * light[DISC + DISC_COS] - own_sin * light[DISC + DISC_SIN]
-            edge_sin = max(NARROWEST_SIN, own_sin)
-            edge, spread = _F(own), _F(edge_sin)
         normal_n = multiply_transposed(dcm_bn, (cells[i].nx, cells[i].ny, cells[i].nz))
         output[i] = 0.0
         if dot(normal_n, nadir_n) > reach_cos:
@@ -205,11 +235,6 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
                 high = mean + width
                 low = min(max(mean - width, edge), high)
                 work[_TERMS + j] = passed * (high - low) * (high + low)
-            if screen.blocked.shape[0] > 0:
-                for j in range(PATCHES):
-                    patch_n = (float(light[X + j]), float(light[Y + j]), float(light[Z + j]))
-                    if light[LIGHT + j] > _ZERO and is_blocked(screen, i, unit(multiply(dcm_bn, patch_n))):
-                        work[_TERMS + j] = _ZERO
             # The terms are added apart, in a fixed order: a sum inside the loop would keep it from vector instructions.
             a, b, c, d = _ZERO, _ZERO, _ZERO, _ZERO
             for j in range(0, PATCHES, 4):

@@ -138,6 +138,17 @@ def _limit(p: SunCells, voltages) -> int:
 
 
 @kernel
+def _received(p: SunCells, i: int, side: float, cosine: float, sun_b: Vec3) -> float:
+    """Sunlight [-] on cell `i`, which has a view or a response of its own, by the cosine of the Sun on it."""
+    if cosine < view_cosine(p.screen, i, p.cos_half_view) or is_blocked(p.screen, i, sun_b):
+        return 0.0
+    received = max(0.0, cosine)
+    if p.responses.shape[0] > 0:
+        received = cell_response.response_at(p.responses, min(i, p.responses.shape[0] - 1), cosine)
+    return received * transmission(p.screen, side, sun_b)
+
+
+@kernel
 def sample(
     p: SunCells,
     cells,
@@ -162,16 +173,17 @@ def sample(
     """
     # the outputs hold the factors until each is used
     _draw_degradation(p, key, step, voltages_out)
+    # chosen once: cells that are alike cost no more than if others were not thought of
+    alike = p.responses.shape[0] + p.screen.views.shape[0] + p.screen.blocked.shape[0] == 0
     shadowed = faults.shape[0] > 0 and any_acts(faults, CELL, SHADOWED, step)
     for i in range(voltages_out.shape[0]):
         cell = cells[i]
         v = albedo[i]
         cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
-        if cosine >= view_cosine(p.screen, i, p.cos_half_view) and not is_blocked(p.screen, i, sun_b):
-            received = max(0.0, cosine)
-            if p.responses.shape[0] > 0:
-                received = cell_response.response_at(p.responses, min(i, p.responses.shape[0] - 1), cosine)
-            v += intensity * received * transmission(p.screen, cell.side, sun_b)
+        if not alike:
+            v += intensity * _received(p, i, cell.side, cosine, sun_b)
+        elif cosine >= p.cos_half_view:
+            v += intensity * max(0.0, cosine) * transmission(p.screen, cell.side, sun_b)
         if shadowed:
             v *= light_left(faults, step, i)
         light = v
