@@ -27,7 +27,9 @@ def test_draws_stand_in_the_place_of_the_missions_values():
     assert not mission.dispersions and "dispersions" not in mission.text()
     assert 0.0 < mission.node("css_array").values.noise < 0.02
     inertia = mission.values.spacecraft.inertia
-    assert np.all(inertia == inertia.T) and not np.allclose(inertia, load_mission("okeefe_2013").values.spacecraft.inertia)
+    assert np.all(inertia == inertia.T) and not np.allclose(
+        inertia, load_mission("okeefe_2013").values.spacecraft.inertia
+    )
     # what was drawn is what a recording of the flight reads back
     again = mission_from_text(mission.text(), "text")
     np.testing.assert_array_equal(again.values.spacecraft.inertia, inertia)
@@ -112,5 +114,7 @@ def test_a_draw_that_cannot_fly_names_its_case():
 
 
 def test_choices_are_words_of_the_parameter():
-    seen = {of_case(case, "dispersions.css_array.degradation_mode=choice:common:per_cell").lines()[0] for case in range(20)}
+    seen = {
+        of_case(case, "dispersions.css_array.degradation_mode=choice:common:per_cell").lines()[0] for case in range(20)
+    }
     assert seen == {"css_array.degradation_mode = common", "css_array.degradation_mode = per_cell"}

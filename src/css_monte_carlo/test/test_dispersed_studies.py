@@ -67,7 +67,11 @@ def test_other_dispersions_are_another_study(study):
 
 def test_surroundings_are_shared_where_nothing_changes_them():
     assert share_surroundings(mission(*DISPERSED).dispersions)
-    for other in ("orbit.raan_deg=uniform:0:9", "css_array.albedo.factor=uniform:1:2", "dynamics.shadow=choice:conical:cylindrical"):
+    for other in (
+        "orbit.raan_deg=uniform:0:9",
+        "css_array.albedo.factor=uniform:1:2",
+        "dynamics.shadow=choice:conical:cylindrical",
+    ):
         assert not share_surroundings(mission(f"dispersions.{other}").dispersions)
     flight = MissionFlight(mission(*DISPERSED), "ekf")
     shared, alone = flight.around_case(2), MissionFlight(drawn(mission(*DISPERSED, "mission.case=2")).mission, "ekf")

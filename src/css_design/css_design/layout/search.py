@@ -16,7 +16,7 @@ from css_design.errors import DesignError
 from css_design.layout.heading_error import HeadingError
 from css_design.layout.judge import LayoutJudge
 from css_design.layout.placements import allowed
-from css_design.layout.readings import Cells
+from css_design.layout.readings import Cells, Readings
 
 _FORBIDDEN = 1e6
 _STEP = 0.35  # [rad] by which the refinement moves a normal at the most
@@ -74,7 +74,8 @@ class LayoutSearch:
             if count not in counts:
                 continue
             self._keep(self._places.chosen(chosen))
-            for start in [self._places.chosen(chosen), *(s for s in starts if s.count == count)]:
+            grown = [self._grown(self.best[count - 1].cells)] if count - 1 in self.best else []
+            for start in [self._places.chosen(chosen), *grown, *(s for s in starts if s.count == count)]:
                 self._keep(start)
                 self._progress(f"{count} cells: refinement")
                 self._keep(self._refined(start))
@@ -104,6 +105,18 @@ class LayoutSearch:
             if cost >= before - 1e-9:
                 break
         return chosen
+
+    def _grown(self, cells: Cells) -> Cells:
+        """A layout with one more cell, at the place that is best for it."""
+        own = self._judge.read(cells)
+        together = Cells(*(np.concatenate(part) for part in zip(cells, self._places, strict=True)))
+        readings = Readings(*(np.concatenate(part) for part in zip(own, self._readings, strict=True)))
+        numbers = list(range(cells.count))
+        costs = [
+            self._judge.cost(self._judge.error(together, readings, [*numbers, cells.count + place]))
+            for place in range(self._places.count)
+        ]
+        return together.chosen([*numbers, cells.count + int(np.argmin(costs))])
 
     def _refined(self, cells: Cells) -> Cells:
         axes = [_across(normal) for normal in cells.normals_b]
