@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a mission disperses is drawn by seed, case and name alone, is physical, and is refused where it means nothing."""
+"""What a mission disperses is drawn by seed, case and name alone, is physical, and refused where it means nothing."""
 
 import numpy as np
 import pytest
@@ -109,7 +109,7 @@ def test_one_number_is_drawn_once():
 
 
 def test_a_draw_that_cannot_fly_names_its_case():
-    with pytest.raises(MissionError, match="case 1 draws what cannot fly.*triangle inequality"):
+    with pytest.raises(MissionError, match=r"case 1 draws what cannot fly.*triangle inequality"):
         of_case(1, "dispersions.spacecraft.inertia.8=uniform:30.0:31.0")
 
 

@@ -31,7 +31,7 @@ VERBS = {
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
     "new": Verb("write the mission of your own spacecraft: gains, gates and steps computed", "css_design", "new"),
-    "layout": Verb("search where the Sun sensor cells should look: error against number of cells", "css_design", "layout"),
+    "layout": Verb("search where the cells should look: error against number of cells", "css_design", "layout"),
     "budget": Verb("split heading and pointing error by source: predicted, and measured", "css_design", "budget"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),

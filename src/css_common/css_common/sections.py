@@ -207,7 +207,11 @@ WHEELS: Table = (
     WHEEL_MAX_TORQUES,
     WHEEL_MAX_SPEEDS,
 )
-_EACH = {WHEEL_INERTIA: WHEEL_INERTIAS, WHEEL_MAX_TORQUE: WHEEL_MAX_TORQUES, WHEEL_MAX_SPEED: WHEEL_MAX_SPEEDS}
+_EACH: dict[Parameter[float], Parameter[np.ndarray]] = {
+    WHEEL_INERTIA: WHEEL_INERTIAS,
+    WHEEL_MAX_TORQUE: WHEEL_MAX_TORQUES,
+    WHEEL_MAX_SPEED: WHEEL_MAX_SPEEDS,
+}
 
 RODS_FITTED = flag("rods.fitted", False, "the spacecraft carries magnetic torque rods")
 ROD_AXES = reals(
@@ -353,7 +357,7 @@ def needed_of_wheels(values: Values) -> tuple[str, ...]:
     """What a component cannot do without that turns the wheels, if there are any."""
     if not values[WHEELS_FITTED]:
         return ()
-    return tuple(p.name for p in (WHEEL_AXES, *(of_all for of_all, each in _EACH.items() if not len(values[each]))))
+    return (WHEEL_AXES.name, *(of_all.name for of_all, each in _EACH.items() if not len(values[each])))
 
 
 def needed_of_wheel_momentum(values: Values) -> tuple[str, ...]:

@@ -40,5 +40,5 @@ def test_a_choice_gives_each_as_often():
      "choice:a", "choice:a:", "normal:nan", "uniform:0:inf", "normal:0:1:5:4", "lognormal:0.1:2", "normal:yes"],
 )  # fmt: skip
 def test_what_is_none_is_refused(text):
-    with pytest.raises(ValueError, match="normal:S|a spread above 0|two values|second number|ends between"):
+    with pytest.raises(ValueError, match=r"normal:S|a spread above 0|two values|second number|ends between"):
         distribution(text)

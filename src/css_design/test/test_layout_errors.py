@@ -103,7 +103,7 @@ def test_more_cells_are_no_worse_and_the_paper_is_beaten_by_its_own_measure():
 def test_places_are_on_their_faces_and_clear_of_the_plane():
     places = candidates(faces_of(["+x", "-z"]), (0.0, 45.0), (90.0, 120.0))
     # one place, tilted half-way, is on both faces
-    assert places.count == 2 * 17 and set(places.views_deg) == {90.0, 120.0}
+    assert places.number == 2 * 17 and set(places.views_deg) == {90.0, 120.0}
     faces = faces_of(["+x", "-z"])
     assert allowed(places.normals_b, faces, 45.0, np.zeros(3))
     assert not allowed(places.normals_b, faces, 40.0, np.zeros(3))

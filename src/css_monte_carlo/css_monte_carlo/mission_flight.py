@@ -110,7 +110,9 @@ class MissionFlight:
         # an attitude filter is aided by references of its own, or as a Sun estimator is
         aided = self._filter is not None and getattr(_algorithm(self._filter), "AIDED_BY_SKY", False)
         self._aided = _values(self._filter) if aided else None
-        self.surroundings = self._surroundings(common, aided) if surrounded_as is None else surrounded_as.surroundings
+        self.surroundings: SurroundingsTables = (
+            self._surroundings(common, aided) if surrounded_as is None else surrounded_as.surroundings
+        )
         illumination = self.surroundings.states(0, self.steps)["illumination"]
         self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
 

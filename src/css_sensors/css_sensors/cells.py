@@ -84,13 +84,15 @@ def conflicts(cells: Values) -> Iterator[str]:
 
 def half_view_cosine(values: Values) -> float:
     """Cosine of half the cone of view, of the widest where cells differ in theirs."""
-    widest = max(values[FIELDS_OF_VIEW]) if len(values[FIELDS_OF_VIEW]) else values[FIELD_OF_VIEW]
+    own: np.ndarray = values[FIELDS_OF_VIEW]
+    widest = float(np.max(own)) if len(own) else values[FIELD_OF_VIEW]
     return math.cos(math.radians(0.5 * widest))
 
 
 def own_view_cosines(values: Values) -> np.ndarray:
     """Cosine (N,) of half the cone of view of each cell; none where they are alike."""
-    return np.array([math.cos(math.radians(0.5 * view)) for view in values[FIELDS_OF_VIEW]])
+    views: np.ndarray = values[FIELDS_OF_VIEW]
+    return np.array([math.cos(math.radians(0.5 * view)) for view in views.tolist()])
 
 
 def blocked_directions(values: Values) -> np.ndarray:

@@ -33,7 +33,7 @@ class Point(NamedTuple):
     def as_object(self) -> dict[str, Any]:
         """What `--json` says."""
         return {
-            "cells": self.found.cells.count,
+            "cells": self.found.cells.number,
             **error_object(self.found.error),
             "cost_deg": self.found.cost,
             "on_front": self.on_front,
@@ -79,13 +79,13 @@ def mission_with_cells(mission: Mission, cells: Cells, blocked: np.ndarray) -> M
         "cells.field_of_view_deg": repr(float(cells.views_deg[0])),
         "cells.fields_of_view_deg": "" if alike else _words(cells.views_deg.tolist()),
         "cells.blocked": _words(blocked.tolist()) if np.any(blocked) else "",
-        "mission.name": name_for_files(f"{mission.name}_{cells.count}_cells"),
+        "mission.name": name_for_files(f"{mission.name}_{cells.number}_cells"),
     }
     try:
         made = mission.with_overrides(f"{key}={text}" for key, text in overrides.items())
         preflight(made)
     except MissionError as error:
-        raise DesignError(f"{mission.name} does not fly with {cells.count} cells: {error}") from error
+        raise DesignError(f"{mission.name} does not fly with {cells.number} cells: {error}") from error
     return made
 
 

@@ -78,8 +78,10 @@ class LayoutJudge:
         self.blocking = None if structure is None else Blocking(structure)
         if self.blocking is not None and structure is not None:
             places = structure.cells if len(structure.cells) else None
-            if places is not None and len(places) != self.own.count:
-                raise DesignError(f"cells: {len(places)} places given, expected one for each of {self.own.count} cells")
+            if places is not None and len(places) != self.own.number:
+                raise DesignError(
+                    f"cells: {len(places)} places given, expected one for each of {self.own.number} cells"
+                )
             self.own_blocked = self.blocking.table(self.own.normals_b, places)
         self._aims = aims
         self.sigma = cell_sigma(array.values)
@@ -91,8 +93,8 @@ class LayoutJudge:
         Args:
             blocked: of `Blocking.table`; None: what the structure blocks from the faces that they are on.
         """
-        parts = [self._read(cells.chosen(range(i, min(i + MOST_CELLS, cells.count))), blocked)
-                 for i in range(0, cells.count, MOST_CELLS)]  # fmt: skip
+        parts = [self._read(cells.chosen(range(i, min(i + MOST_CELLS, cells.number))), blocked)
+                 for i in range(0, cells.number, MOST_CELLS)]  # fmt: skip
         return Readings(*(np.concatenate(part) for part in zip(*parts, strict=True)))
 
     def _read(self, cells: Cells, blocked: np.ndarray | None) -> Readings:
@@ -115,7 +117,7 @@ class LayoutJudge:
 
     def error_of(self, cells: Cells, blocked: np.ndarray | None = None) -> HeadingError:
         """Error of the layout of cells; `blocked` as of `read`."""
-        return self.error(cells, self.read(cells, blocked), range(cells.count))
+        return self.error(cells, self.read(cells, blocked), range(cells.number))
 
     def cost(self, error: HeadingError) -> float:
         """What a search makes small [deg]."""

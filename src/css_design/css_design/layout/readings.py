@@ -23,7 +23,7 @@ class Cells(NamedTuple):
     views_deg: np.ndarray  # (N,) full cones of view
 
     @property
-    def count(self) -> int:
+    def number(self) -> int:
         """How many."""
         return len(self.views_deg)
 

@@ -55,7 +55,7 @@ class LayoutSearch:
         self._judge, self._faces, self._tilt_deg = judge, faces, tilt_deg
         free = [allowed(place[None], faces, tilt_deg, judge.clip_normal_b) for place in places.normals_b]
         self._places = places.chosen(np.flatnonzero(free).tolist())
-        if not self._places.count:
+        if not self._places.number:
             raise DesignError("--faces: no cell may be on them, as the body plane of the mission hides half of the sky")
         self._readings = judge.read(self._places)
         self._progress = progress
@@ -75,7 +75,7 @@ class LayoutSearch:
                 continue
             self._keep(self._places.chosen(chosen))
             grown = [self._grown(self.best[count - 1].cells)] if count - 1 in self.best else []
-            for start in [self._places.chosen(chosen), *grown, *(s for s in starts if s.count == count)]:
+            for start in [self._places.chosen(chosen), *grown, *(s for s in starts if s.number == count)]:
                 self._keep(start)
                 self._progress(f"{count} cells: refinement")
                 self._keep(self._refined(start))
@@ -84,9 +84,9 @@ class LayoutSearch:
         if not allowed(cells.normals_b, self._faces, self._tilt_deg, self._judge.clip_normal_b):
             return
         error = self._judge.error_of(cells)
-        found, known = Found(cells, error, self._judge.cost(error)), self.best.get(cells.count)
+        found, known = Found(cells, error, self._judge.cost(error)), self.best.get(cells.number)
         if known is None or found.cost < known.cost:
-            self.best[cells.count] = found
+            self.best[cells.number] = found
 
     def _cost(self, chosen: Sequence[int]) -> float:
         return self._judge.cost(self._judge.error(self._places, self._readings, chosen))
@@ -98,7 +98,7 @@ class LayoutSearch:
             before = cost
             for k in reversed(range(len(chosen))):
                 others = [*chosen[:k], *chosen[k + 1 :]]
-                costs = [self._cost([*others, place]) for place in range(self._places.count)]
+                costs = [self._cost([*others, place]) for place in range(self._places.number)]
                 best = int(np.argmin(costs))
                 if costs[best] < cost - 1e-9:
                     chosen, cost = [*others[:k], best, *others[k:]], costs[best]
@@ -111,12 +111,12 @@ class LayoutSearch:
         own = self._judge.read(cells)
         together = Cells(*(np.concatenate(part) for part in zip(cells, self._places, strict=True)))
         readings = Readings(*(np.concatenate(part) for part in zip(own, self._readings, strict=True)))
-        numbers = list(range(cells.count))
+        numbers = list(range(cells.number))
         costs = [
-            self._judge.cost(self._judge.error(together, readings, [*numbers, cells.count + place]))
-            for place in range(self._places.count)
+            self._judge.cost(self._judge.error(together, readings, [*numbers, cells.number + place]))
+            for place in range(self._places.number)
         ]
-        return together.chosen([*numbers, cells.count + int(np.argmin(costs))])
+        return together.chosen([*numbers, cells.number + int(np.argmin(costs))])
 
     def _refined(self, cells: Cells) -> Cells:
         axes = [_across(normal) for normal in cells.normals_b]
@@ -131,7 +131,7 @@ class LayoutSearch:
                 return _FORBIDDEN
             return self._judge.cost(self._judge.error_of(tried))
 
-        size = 2 * cells.count
+        size = 2 * cells.number
         found = minimize(
             cost,
             np.zeros(size),

@@ -120,7 +120,8 @@ def _mesh(path: Path, scale: float) -> np.ndarray:
     import trimesh
 
     try:
-        triangles = np.array(trimesh.load(path, force="mesh").triangles, dtype=np.float64)
+        mesh: Any = trimesh.load(path, force="mesh")
+        triangles = np.array(mesh.triangles, dtype=np.float64)
     except (OSError, ValueError, TypeError, KeyError, IndexError, AttributeError) as error:
         raise DesignError(f"{path}: no mesh that can be read, expected STL, OBJ or PLY") from error
     if not triangles.size or not np.all(np.isfinite(triangles)):

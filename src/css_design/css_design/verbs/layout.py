@@ -59,7 +59,7 @@ def run(options: argparse.Namespace) -> int:
     if written and structure is not None:
         written_own = write_own(mission, own, judge.own_blocked, folder)
         console.print(f"the mission's own cells with what the structure blocks: {written_own}", soft_wrap=True)
-    _print(points, own.count, own_error, judge.cost(own_error), console)
+    _print(points, own.number, own_error, judge.cost(own_error), console)
     for line in refused:
         print(f"layout: warning: {line}", file=sys.stderr)
     if written:
@@ -67,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         result = {
             "mission": mission.name,
-            "own": {"cells": own.count, **error_object(own_error), "cost_deg": judge.cost(own_error)},
+            "own": {"cells": own.number, **error_object(own_error), "cost_deg": judge.cost(own_error)},
             "front": [point.as_object() for point in points],
             "weights": aims._asdict(),
             "pointing": options.pointing,
@@ -118,7 +118,7 @@ def _print(points: list[Point], own_cells: int, own: HeadingError, own_cost: flo
     table.add_number("on the\nfront")
     table.add_texts([f"{own_cells} as they are", *_figures(own), f"{own_cost:.2f}", ""])
     for point in points:
-        count = point.found.cells.count
+        count = point.found.cells.number
         front = "yes" if point.on_front else "no"
         table.add_texts([f"{count}", *_figures(point.found.error), f"{point.found.cost:.2f}", front])
     console.print(table)
