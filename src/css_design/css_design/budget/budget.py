@@ -11,6 +11,8 @@ from css_design.budget import measured, propagation
 from css_design.budget.measured import ALL, Errors, Estimate, Split
 from css_design.budget.propagation import Propagated
 from css_design.budget.sources import FILTER, LAYOUT, SOURCES, heard_sources, is_active
+from css_design.errors import DesignError
+from css_monte_carlo.mission_parts import is_heading
 
 _ALIKE = 1.33  # ratio within which two are taken for the same
 _MATTERS = 0.02  # of the mean square: what is less is not worth a remark
@@ -66,8 +68,10 @@ def budget_of(
         tell_flown, tell_predicted: told how much is done, and of how much.
 
     Raises:
+        DesignError: the mission estimates no Sun.
         MissionError: the compiled loop has no place for something of the mission.
     """
+    _check(mission)
     flown = measured.fly(measured.configurations(mission), cases, tell_flown)
     predicted = propagation.propagate(mission, nominal, tell_predicted)
     active = [source for source in heard_sources(mission) if is_active(mission, source)]
@@ -83,6 +87,16 @@ def budget_of(
         parts,
         list(_remarks(mission, predicted, flown)),
     )
+
+
+def _check(mission: Mission) -> None:
+    name = mission.values.graph.estimator
+    node = next((node for node in mission.nodes if node.name == name), None)
+    if node is None or not is_heading(node):
+        what = "is not in the graph" if node is None else "estimates no Sun"
+        raise DesignError(
+            f"{mission.origin}: graph.estimator: {name} {what}, expected a Sun estimator, whose heading is split"
+        )
 
 
 def _part(
