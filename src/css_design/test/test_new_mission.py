@@ -45,9 +45,7 @@ def test_every_template_passes_every_check(template):
 def test_six_faces_acquire_the_sun(template, tmp_path):
     """From a tumble in any attitude: all of a few cases are on the Sun after ten minutes, and stay."""
     # in sunlight from the start: a quarter of the orbit after the node at 10:30
-    mission = made(template).mission.with_overrides(
-        ["mission.duration=1200", "orbit.true_anomaly_deg=90"]
-    )
+    mission = made(template).mission.with_overrides(["mission.duration=1200", "orbit.true_anomaly_deg=90"])
     study = run_study(mission, [Configuration("sun_filter", True)], 3, tmp_path / "study")
     acquired = np.array(study.cases["acquired_s"].to_pylist(), dtype=float)
     pointing = np.array(study.cases["pointing_error_mean_deg"].to_pylist(), dtype=float)
