@@ -90,7 +90,7 @@ def test_scale_and_tilt_of_cells_against_the_geometry():
     nodes = "css_sim/dynamics,css_sim/css_array,css_sim/gyro,css_estimation/wls,sunpoint_control/mrp_control"
     mission = base.with_overrides([f"graph.nodes={nodes}", "graph.estimator=wls"]).with_overrides(["wls.weights=equal"])
     found, path = split_along(mission)
-    expected = {"calibration": [], "misalignment": []}
+    expected: dict[str, list[float]] = {"calibration": [], "misalignment": []}
     cells = mission.values.cells.normals
     for sun in path.sun_b[2000:][path.counted[2000:]][::50]:
         seen = cells[cells @ sun > 0.5]

@@ -12,7 +12,8 @@ from css_design.budget.measured import ALL, Errors, Estimate, Split
 from css_design.budget.propagation import Propagated
 from css_design.budget.sources import FILTER, LAYOUT, SOURCES, heard_sources, is_active
 from css_design.errors import DesignError
-from css_monte_carlo.mission_parts import is_heading
+from css_monte_carlo.mission_parts import is_heading, parts_of
+from css_sim.earth_reflectivity import clouds_move
 
 _ALIKE = 1.33  # ratio within which two are taken for the same
 _MATTERS = 0.02  # of the mean square: what is less is not worth a remark
@@ -170,6 +171,9 @@ def _remarks(mission: Mission, predicted: Propagated, flown: dict[str, Errors]) 
         yield "scripted events fly in the Monte Carlo; the propagation goes by the parameters of the start"
     if mission.faults:
         yield "faults of the mission act in every configuration"
+    array = parts_of(mission).array.values
+    if array.albedo.enabled and clouds_move(array):
+        yield "clouds move in the flights; the propagation lets them stand as they are at the start"
     for node in mission.nodes:
         if getattr(node.values, "latency", 0.0) or getattr(node.values, "latency_spread", 0.0):
             yield f"latency of {node.name} counts as {FILTER}"
