@@ -29,6 +29,8 @@ VERBS = {
     "play": Verb("play a bag onto live topics", "css_recording", "player"),
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
     "import-csv": Verb("turn a table of measurements into a bag", "css_telemetry", "import_csv"),
+    "calibrate": Verb("calibrate cells, magnetometer and gyro from a bag", "css_calibration", "calibrate"),
+    "check": Verb("find the cells of a bag that lie", "css_calibration", "check"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
     "new": Verb("write the mission of your own spacecraft: gains, gates and steps computed", "css_design", "new"),
