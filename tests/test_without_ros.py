@@ -31,7 +31,10 @@ def both(without, tmp_path):
 
     def run_both(verb, *arguments):
         outputs = []
-        for name, run_one in (("with", lambda *a, cwd: run(ROOT / "install", os.environ, *a, cwd=cwd)), ("without", without.run)):
+        for name, run_one in (
+            ("with", lambda *a, cwd: run(ROOT / "install", os.environ, *a, cwd=cwd)),
+            ("without", without.run),
+        ):
             folder = tmp_path / name
             folder.mkdir(exist_ok=True)
             done = run_one(verb, *arguments, cwd=folder)
@@ -66,7 +69,9 @@ def without_times(value):
 
 
 def test_ros_is_out_of_reach(without):
-    code = "import sys; from css_msgs.msg import SunEstimate as S; print(S.__base__.__name__, S.RATE_GYRO); import rclpy"
+    code = (
+        "import sys; from css_msgs.msg import SunEstimate as S; print(S.__base__.__name__, S.RATE_GYRO); import rclpy"
+    )
     done = subprocess.run(
         [without.project.python, "-c", code], env=without.env, capture_output=True, text=True, check=False
     )
@@ -76,7 +81,9 @@ def test_ros_is_out_of_reach(without):
 
 def test_verbs_load_without_ros_or_say_that_they_need_it(without):
     """One that does not has to be declared in `bootstrap.verbs` (`ros=True`)."""
-    modules = [f"{verb.package}.{room}.{verb.executable}" for verb in ANALYSIS.values() for room in ("commands", "verbs")]
+    modules = [
+        f"{verb.package}.{room}.{verb.executable}" for verb in ANALYSIS.values() for room in ("commands", "verbs")
+    ]
     assert len(modules) >= 14
     done = subprocess.run(
         [without.project.python, "-c", f"import {', '.join(modules)}"],

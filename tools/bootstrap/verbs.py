@@ -26,10 +26,14 @@ class Verb(NamedTuple):
 
 
 VERBS = {
-    "demo": Verb("fly one orbit, record it, replay it through four estimators, draw it", "css_bringup", "demo", ros=True),
+    "demo": Verb(
+        "fly one orbit, record it, replay it through four estimators, draw it", "css_bringup", "demo", ros=True
+    ),
     "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly", ros=True),
     "replay": Verb("step estimators over a recorded bag and compare", "css_bringup", "replay"),
-    "bench": Verb("measure the speed of the graph, and of the Monte Carlo beside Basilisk", "css_bringup", "bench", ros=True),
+    "bench": Verb(
+        "measure the speed of the graph, and of the Monte Carlo beside Basilisk", "css_bringup", "bench", ros=True
+    ),
     "record": Verb("record topics into an MCAP bag", "css_recording", "recorder", ros=True),
     "play": Verb("play a bag onto live topics", "css_recording", "player", ros=True),
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),

@@ -18,7 +18,17 @@ from css_common.schema import ParameterError, Table
 PARAMETER_EVENTS = "/parameter_events"
 
 # fields of rcl_interfaces/msg/ParameterValue in the order of its types, which begin with 1
-_VALUES = ("bool", "integer", "double", "string", "byte_array", "bool_array", "integer_array", "double_array", "string_array")
+_VALUES = (
+    "bool",
+    "integer",
+    "double",
+    "string",
+    "byte_array",
+    "bool_array",
+    "integer_array",
+    "double_array",
+    "string_array",
+)
 
 
 class ParameterChange(NamedTuple):
