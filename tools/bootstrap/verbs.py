@@ -70,10 +70,10 @@ Missions are files in config/ or anywhere; one may extend another (`extends: OTH
 A flight has a ROS domain for itself. shell, record and play join it; when several are running,
 --flight NAME|PID or --domain N chooses.
 
-./sunpoint VERB --help explains one verb, ./sunpoint --version says which version this is.{_where_ros_is_not(machine)}"""
+./sunpoint VERB --help explains one verb, ./sunpoint --version says which version this is.{_without_ros(machine)}"""
 
 
-def _where_ros_is_not(machine: str) -> str:
+def _without_ros(machine: str) -> str:
     if machine == WITH_WHEELS:
         return ""
     verbs = ", ".join(name for name, verb in VERBS.items() if verb.ros)

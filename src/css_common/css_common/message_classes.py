@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Message classes made from `.msg` files, for machines on which ROS, which generates and compiles them, is not to be had.
+"""Message classes made from `.msg` files, for machines without ROS, which generates and compiles them elsewhere.
 
 Everything here reads and writes messages as bytes by `css_common.codec`, which asks a message class for its fields and
 their types alone. A class made here answers as the generated one does, with its constants; it holds no values.
@@ -30,16 +30,13 @@ class BasicType(NamedTuple):
 
 
 class UnboundedString(NamedTuple):
-    """A string of any length; `wide` when of 16-bit characters."""
-
-    wide: bool = False
+    """A string of any length."""
 
 
 class BoundedString(NamedTuple):
     """A string of at most so many characters."""
 
     maximum_size: int
-    wide: bool = False
 
 
 class NamespacedType(NamedTuple):
@@ -106,7 +103,8 @@ def message_class(package: str, file: Path) -> type[MessageClass]:
         "__doc__": f"Message {package}/msg/{file.stem}.",
         "SLOT_TYPES": tuple(slots.values()),
         "_fields_and_field_types": {name: _text(slot) for name, slot in slots.items()},
-        **{name: value for name, _, value in constants},
+        # generated classes have a byte as bytes
+        **{name: bytes([value]) if kind == "byte" else value for name, kind, value in constants},
     }
     return type(file.stem, (MessageClass,), members)
 
@@ -119,8 +117,8 @@ def _slot(kind: FieldDesc) -> Any:
         return NamespacedType((package, folder), name)
     if node == Nodetype.BASE:
         name, bound = content
-        if name in ("string", "wstring"):
-            return BoundedString(bound, name == "wstring") if bound else UnboundedString(name == "wstring")
+        if name == "string":
+            return BoundedString(bound) if bound else UnboundedString()
         return BasicType(_IDL[name])
     element, count = content
     if node == Nodetype.ARRAY:
@@ -132,9 +130,9 @@ def _text(slot: Any) -> str:
     if isinstance(slot, BasicType):
         return slot.typename
     if isinstance(slot, UnboundedString):
-        return "wstring" if slot.wide else "string"
+        return "string"
     if isinstance(slot, BoundedString):
-        return f"{'wstring' if slot.wide else 'string'}<{slot.maximum_size}>"
+        return f"string<{slot.maximum_size}>"
     if isinstance(slot, NamespacedType):
         return f"{slot.namespaces[0]}/{slot.name}"
     if isinstance(slot, Array):
