@@ -1,15 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cases of a study come to, stage by stage, written to a file; `aarch64.py` compares those of two processors.
 
-`python benchmarks/flight_bits.py MISSION ESTIMATOR CASES SECONDS FILE.npz`
+`python benchmarks/flight_bits.py MISSION ESTIMATOR CASES SECONDS FILE.npz [keep|take CARRIED.pickle]`
+
+`keep` writes what the functions of `CARRIED` gave, `take` gives their results again instead of calling them: whether
+they alone are why two flights differ.
 """
 
+import functools
 import math
+import pickle
 import random
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+import erfa
 import numpy as np
 
 from css_common.mission import load_mission
@@ -17,6 +24,8 @@ from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.mission_flight import MissionFlight
 
 _DRAWS = 20_000
+CARRIED = ((erfa, "epv00"), (erfa, "c2t06a"), (np.linalg, "pinv"))
+"""Functions of other compiled libraries that a flight calls before it begins, and that round as they were compiled."""
 
 
 def elementary_functions() -> dict[str, np.ndarray]:
@@ -40,7 +49,28 @@ def elementary_functions() -> dict[str, np.ndarray]:
         found[f"numpy {name}"] = getattr(np, name)(*given)
     square = np.resize(unit, (100, 12, 12))
     found["numpy matmul"] = square @ square
+    found["numpy linalg.inv"] = np.linalg.inv(square + 12.0 * np.eye(12))
+    found["numpy linalg.pinv"] = np.linalg.pinv(square[:, :, :4])
+    days = 100.0 * unit
+    found["erfa epv00"] = np.stack([part["p"] for part in erfa.epv00(2451545.0, days)])
+    found["erfa c2t06a"] = erfa.c2t06a(2451545.0, days, 2451545.0, days, 0.0, 0.0)
     return found
+
+
+def carry(how: str, file: Path) -> None:
+    """Replaces the functions of `CARRIED` by such as keep their results, or take those of another processor."""
+    kept: dict[str, list[Any]] = pickle.loads(file.read_bytes()) if how == "take" else {n: [] for _, n in CARRIED}
+    for module, name in CARRIED:
+        results = iter(list(kept[name]))
+
+        def call(*arguments: Any, real: Any, name: str, results: Iterator[Any]) -> Any:
+            if how == "take":
+                return next(results)
+            kept[name].append(real(*arguments))
+            file.write_bytes(pickle.dumps(kept))
+            return kept[name][-1]
+
+        setattr(module, name, functools.partial(call, real=getattr(module, name), name=name, results=results))
 
 
 def leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
@@ -56,9 +86,11 @@ def leaves(value: Any, path: str) -> Iterator[tuple[str, np.ndarray]]:
         yield path, np.asarray(value)
 
 
-def main(mission: str, estimator: str, cases: str, seconds: str, file: str) -> None:
+def main(mission: str, estimator: str, cases: str, seconds: str, file: str, how: str = "", carried: str = "") -> None:
     """Flies, and writes every stage under a name that begins with its number."""
     stages = {f"1 functions {name}": values for name, values in elementary_functions().items()}
+    if how:
+        carry(how, Path(carried))
     flight = MissionFlight(load_mission(mission, [f"mission.duration={seconds}"]), estimator)
     numbers = np.arange(int(cases))
     drawn, initial = flight.cases(numbers, 0.0)

@@ -12,6 +12,9 @@ import subprocess
 import pytest
 from listing import ROOT
 
+# installs what a machine has, and compiles a loop of a study anew
+pytestmark = pytest.mark.timeout(1000)
+
 MADE = shutil.ignore_patterns(
     ".*cache*", ".git", ".venv", ".hypothesis", "build", "install", "log", "studies", "reports", "bags", "__pycache__"
 )
@@ -34,7 +37,7 @@ def start(tmp_path_factory):
 
     def run(*arguments):
         command = [folder / "sunpoint" / "sunpoint", *arguments]
-        return subprocess.run(command, env=env, capture_output=True, text=True, timeout=280, check=False)
+        return subprocess.run(command, env=env, capture_output=True, text=True, timeout=900, check=False)
 
     run.folder = folder / "sunpoint"
     return run
