@@ -29,7 +29,7 @@ CARRIED = ((erfa, "epv00"), (erfa, "c2t06a"), (np.linalg, "pinv"))
 
 
 def elementary_functions() -> dict[str, np.ndarray]:
-    """Results of the functions of the C library, as kernels call them, and of numpy's, at 20 000 places."""
+    """Results of the functions of the C library, as kernels call them, of numpy and erfa, at up to 20 000 places."""
     source = random.Random(1)
     wide = np.array([source.uniform(-10.0, 10.0) for _ in range(_DRAWS)])
     unit = wide / 10.0
@@ -51,7 +51,7 @@ def elementary_functions() -> dict[str, np.ndarray]:
     found["numpy matmul"] = square @ square
     found["numpy linalg.inv"] = np.linalg.inv(square + 12.0 * np.eye(12))
     found["numpy linalg.pinv"] = np.linalg.pinv(square[:, :, :4])
-    days = 100.0 * unit
+    days = 100.0 * unit[:200]  # thousands of terms each
     found["erfa epv00"] = np.stack([part["p"] for part in erfa.epv00(2451545.0, days)])
     found["erfa c2t06a"] = erfa.c2t06a(2451545.0, days, 2451545.0, days, 0.0, 0.0)
     return found

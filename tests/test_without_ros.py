@@ -12,6 +12,9 @@ from without_ros import packages_laid_out, run
 
 from bootstrap.verbs import VERBS
 
+# two of them compile the loop of a study, when nobody has before
+pytestmark = pytest.mark.timeout(900)
+
 ANALYSIS = {name: verb for name, verb in VERBS.items() if verb.package and not verb.ros}
 SAMPLES = ROOT / "docs" / "samples"
 REFERENCE = ROOT / "bags" / "reference"

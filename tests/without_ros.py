@@ -58,7 +58,7 @@ def run(install: Path, env: Mapping[str, str], verb: str, *arguments, cwd: Path)
     package, executable = VERBS[verb].package, VERBS[verb].executable
     command = [install / package / "lib" / package / executable, *arguments]
     typed = {**env, "SUNPOINT_VERB": f"{verb}:{executable}"}
-    return subprocess.run(command, env=typed, cwd=cwd, capture_output=True, text=True, timeout=250, check=False)
+    return subprocess.run(command, env=typed, cwd=cwd, capture_output=True, text=True, timeout=800, check=False)
 
 
 def packages_laid_out(folder: Path) -> Without:
