@@ -53,7 +53,9 @@ def main() -> int:
                 outcome = _outcome(kind, verdicts, changed)
                 total.update(outcome)
                 said = ", ".join(f"{v.cell} {v.verdict}" for v in verdicts) or "all healthy"
-                print(f"{name} {case} {kind}: {said}: {', '.join(outcome)} ({time.monotonic() - began:.0f} s)", flush=True)
+                print(
+                    f"{name} {case} {kind}: {said}: {', '.join(outcome)} ({time.monotonic() - began:.0f} s)", flush=True
+                )
     print(json.dumps({"reference": options.reference, **total}))
     wrong = total["wrong kind"] + total["missed"] + total["false"]
     return 1 if wrong > 0.1 * (total["right"] + wrong) else 0

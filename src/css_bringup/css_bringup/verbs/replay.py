@@ -3,6 +3,7 @@
 
 import argparse
 
+from css_analysis.flight_log import FlightLog
 from css_analysis.flight_summary import isolated_lines, summary_table
 from css_bringup.options import complain, console
 from css_bringup.replay_bag import ReplayResult, default_replay, mission_of_bag, replay
@@ -60,7 +61,7 @@ def print_replay(result: ReplayResult) -> None:
         console.print(line, soft_wrap=True, highlight=False)
     console.print(f"mission: {result.mission.origin}", soft_wrap=True)
     if result.log.imported:
-        console.print("imported telemetry: errors over all lines; of arrays, orbit and shadow nothing is known")
+        console.print(_imported_line(result.log), soft_wrap=True)
     for run in result.replayed:
         for line in _lines(run, result.elsewhere):
             console.print(f"{run.label}: {line}", soft_wrap=True)
@@ -73,6 +74,14 @@ def print_replay(result: ReplayResult) -> None:
     console.print(
         f"{result.messages} estimates in {result.wall_s:.1f} s ({rate:.0f} a CPU second): {result.bag}", soft_wrap=True
     )
+
+
+def _imported_line(log: FlightLog) -> str:
+    """What the errors of imported telemetry are of."""
+    if log.truth is None:
+        return "imported telemetry: it has no truth, so that there are no errors to tell"
+    unknown = [part for part in ("attitude", "rate", "position", "illumination") if not log.knows(part)]
+    return f"imported telemetry: errors over all lines; not known: {', '.join((*unknown, 'solar arrays'))}"
 
 
 def _lines(run: Replayed, elsewhere: str) -> list[str]:

@@ -10,8 +10,9 @@ import numpy as np
 from css_common.conversions import square
 from css_common.declared import computed, given, made, merged, part, table_of
 from css_common.schema import Values, choice, flag, real, reals
+from css_common.sections import WHEEL_INERTIA, of_each_wheel
 from css_common.vectors import Mat3, mat3
-from css_environment.albedo import Screen, plane_screen
+from css_environment.albedo import Screen, plane_screen, with_views
 from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import EclipseParameters
 from css_estimation.sun.flight_sky import USE_FIELD
@@ -22,8 +23,10 @@ from css_sensors.cells import (
     MEASURED_DARKS,
     MEASURED_NORMALS,
     MEASURED_SCALES,
+    blocked_directions,
     half_view_cosine,
     known_normals,
+    own_view_cosines,
     plane_sides,
 )
 
@@ -64,7 +67,7 @@ def _cells(values: Values) -> np.ndarray:
 
 
 def _screen(values: Values) -> Screen:
-    return plane_screen(values.cells.clip_normal)
+    return with_views(plane_screen(values.cells.clip_normal), own_view_cosines(values), blocked_directions(values))
 
 
 def _table(values: Values) -> np.ndarray:
@@ -74,7 +77,7 @@ def _table(values: Values) -> np.ndarray:
 def _wheels(values: Values) -> np.ndarray:
     axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
     wheels = np.zeros(len(axes), WHEEL)
-    wheels["hx"], wheels["hy"], wheels["hz"] = values.wheels.inertia * axes.T
+    wheels["hx"], wheels["hy"], wheels["hz"] = of_each_wheel(values, WHEEL_INERTIA) * axes.T
     return wheels
 
 
@@ -92,7 +95,7 @@ def _inertia(values: Values) -> Mat3:
         return mat3(np.eye(3))
     axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
     body = np.asarray(values.spacecraft.inertia, dtype=np.float64).reshape(3, 3)
-    return mat3(body + (values.wheels.inertia * axes.T @ axes if values.wheels.fitted else 0.0))
+    return mat3(body + (of_each_wheel(values, WHEEL_INERTIA) * axes.T @ axes if values.wheels.fitted else 0.0))
 
 
 def _anisotropy(values: Values) -> float:
