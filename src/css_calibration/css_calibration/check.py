@@ -202,7 +202,7 @@ def _outputs(
 
 def _usable_but_for_limit(thin: Recorded, data: CellData) -> np.ndarray:
     """Outputs at the limit of a converter, where the light is known all the same."""
-    others = data.usable.any(axis=1)[:, None]
+    others = np.any(data.usable, axis=1, keepdims=True)
     return others & (thin.voltages <= thin.mission.values[LARGEST_READING])
 
 

@@ -63,7 +63,7 @@ def shadows_of(data: CellData, result: Fit, cell: int) -> Shadow | None:
         f"of ({centre[0]:.2f}, {centre[1]:.2f}, {centre[2]:.2f}), on average {100.0 * float(loss[inside].mean()):.0f} %"
     )
     return Shadow(
-        tuple(tuple(float(c) for c in middle) for middle in middles[is_dark].round(3)), int(inside.sum()), int(first),
+        tuple((float(x), float(y), float(z)) for x, y, z in middles[is_dark].round(3)), int(inside.sum()), int(first),
         int(last), evidence,
     )  # fmt: skip
 
