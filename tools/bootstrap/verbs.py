@@ -31,6 +31,7 @@ VERBS = {
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
+    "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
     "test": Verb("run the linters and all tests, or with arguments those tests alone"),
     "lint": Verb("run ruff and mypy over everything"),

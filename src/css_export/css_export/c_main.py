@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A program in C that steps a library over a stream of inputs, and the stream.
+
+The stream is made of records: a word of 64 bits says what comes, then comes it. STEP: the struct of inputs; BEGIN:
+nothing, the state is set up anew; PARAMETERS: the struct of parameters from now on. For each STEP the program writes
+the struct of outputs and a hash of the state after it (FNV-1a over its words of 64 bits), with an argument the state
+itself. All in the order of bytes of the processor.
+"""
+
+import struct
+
+import numpy as np
+
+from css_common.kernel import outer_kernel
+
+STEP, BEGIN, PARAMETERS = 1, 2, 3
+HASH_START = 0xCBF29CE484222325
+_PRIME = 0x100000001B3
+
+
+def word(command: int) -> bytes:
+    """The head of a record."""
+    return struct.pack("<Q", command)
+
+
+@outer_kernel
+def _hash(words) -> np.uint64:
+    value = np.uint64(0xCBF29CE484222325)
+    for k in range(words.shape[0]):
+        value = (value ^ words[k]) * np.uint64(0x100000001B3)
+    return value
+
+
+def state_hash(state: bytes | bytearray) -> int:
+    """The hash of a state, whose last word is filled up with zeros."""
+    padded = bytes(state) + bytes(-len(state) % 8)
+    return int(_hash(np.frombuffer(padded, np.uint64)))
+
+
+def main_text(prefix: str) -> str:
+    """`sunpoint_NAME_main.c`."""
+    return f"""/* SPDX-License-Identifier: Apache-2.0 */
+/* Steps the library over a stream of records on standard input; README.md says what stands in them. */
+#include "{prefix}.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static {prefix}_params params;
+static {prefix}_state state;
+static {prefix}_in input;
+static {prefix}_out output;
+
+static uint64_t hash_of_state(void)
+{{
+    const unsigned char *bytes = (const unsigned char *)&state;
+    uint64_t value = 0xcbf29ce484222325u;
+    size_t at;
+    for (at = 0; at < sizeof state; at += 8) {{
+        uint64_t word = 0;
+        memcpy(&word, bytes + at, sizeof state - at < 8 ? sizeof state - at : 8);
+        value = (value ^ word) * 0x100000001b3u;
+    }}
+    return value;
+}}
+
+static int step_once(int with_state)
+{{
+    uint64_t hash;
+    if (fread(&input, sizeof input, 1, stdin) != 1) {{
+        return 0;
+    }}
+    memset(&output, 0, sizeof output);
+    {prefix}_step(&params, &state, &input, &output);
+    hash = hash_of_state();
+    if (fwrite(&output, sizeof output, 1, stdout) != 1 || fwrite(&hash, sizeof hash, 1, stdout) != 1) {{
+        return 0;
+    }}
+    return !with_state || fwrite(&state, sizeof state, 1, stdout) == 1;
+}}
+
+int main(int count, char **arguments)
+{{
+    uint64_t command;
+    (void)arguments;
+    params = {prefix}_mission;
+    {prefix}_init(&state);
+    while (fread(&command, sizeof command, 1, stdin) == 1) {{
+        int done = 0;
+        if (command == {STEP}u) {{
+            done = step_once(count > 1);
+        }} else if (command == {BEGIN}u) {{
+            {prefix}_init(&state);
+            done = 1;
+        }} else if (command == {PARAMETERS}u) {{
+            done = fread(&params, sizeof params, 1, stdin) == 1 && {prefix}_check(&params) == -1;
+        }}
+        if (!done) {{
+            fprintf(stderr, "{prefix}: a record that cannot be read, or parameters out of their limits\\n");
+            return 1;
+        }}
+    }}
+    return fflush(stdout) == 0 ? 0 : 1;
+}}
+"""
