@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from css_export.sole_parameter import as_it_stands
+
 
 def comments_of(source: Any) -> Callable[[str], str]:
     """What is said of the fields of a NamedTuple class or of a structured dtype, by name; "" where nothing is."""
@@ -31,10 +33,20 @@ def _of_class(source: type) -> dict[str, str]:
             if isinstance(node, ast.ClassDef) and node.name == kind.__name__:
                 told |= dict(_annotated(node, _line_comments(module)))
     for name, made_of in getattr(source, "_field_defaults", {}).items():
-        words = [f"[{p.unit}] {p.description}" for p in getattr(made_of, "table", ())]
-        if len(words) == 1 and name not in told:
-            told[name] = f"of {words[0]}"
+        words = _of_parameter(made_of)
+        if words and name not in told:
+            told[name] = words
     return told
+
+
+def _of_parameter(source: Any) -> str:
+    """What is said of the one parameter that a field is made of; "" where there are several or none."""
+    table = getattr(source, "table", ())
+    if len(table) != 1:
+        return ""
+    (parameter,) = table
+    converted = "" if as_it_stands(source) else f"from {parameter.name} "
+    return f"{converted}[{parameter.unit}] {parameter.description}"
 
 
 def _annotated(node: ast.ClassDef, comments: dict[int, str]) -> Iterator[tuple[str, str]]:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from css_common.schema import Parameter
 from css_export.layout import Layout, Scalar, Struct, leaves
+from css_export.sole_parameter import Only, as_it_stands
 
 REAL, FLAG, WHOLE, SINGLE = 0, 1, 2, 3
 _LARGEST = math.nextafter(math.inf, 0.0)
@@ -90,18 +91,6 @@ def _joined(limits: list[Limit]) -> list[Limit]:
     return joined
 
 
-class _Only:
-    """Values of which only one is known."""
-
-    def __init__(self, parameter: Parameter[Any], value: Any) -> None:
-        self._parameter, self._value = parameter, value
-
-    def __getitem__(self, parameter: Parameter[Any]) -> Any:
-        if parameter != self._parameter:
-            raise KeyError(parameter.name)
-        return self._value
-
-
 def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
     """Unit, least and largest value of a field that hangs on one parameter; None where that says nothing."""
     table = getattr(source, "table", ())
@@ -110,7 +99,7 @@ def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
     (parameter,) = table
 
     def made(given: Any) -> float:
-        return float(source.build(_Only(parameter, given)))
+        return float(source.build(Only(parameter, given)))
 
     try:
         bounds = _bounds(parameter, made)
@@ -118,8 +107,8 @@ def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
         return None  # it hangs on more than this parameter
     if bounds is None:
         return None
-    as_it_stands = made(1) == 1.0 if parameter.kind in ("real", "integer") else False
-    return parameter.unit if as_it_stands else f"of {parameter.name} [{parameter.unit}]", *bounds
+    unit = parameter.unit if as_it_stands(source) else f"from {parameter.name} [{parameter.unit}]"
+    return unit, *bounds
 
 
 def _bounds(parameter: Parameter[Any], made: Callable[[Any], float]) -> tuple[float, float] | None:
