@@ -26,6 +26,8 @@ _DECLARED = re.compile(r"^declare .*?@(\"[^\"]+\"|[\w.$]+)\(", re.MULTILINE)
 _HOST_ATTRIBUTES = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _DEFINITION = re.compile(r"^(define .*?) \{$", re.MULTILINE)
 _CALLED = re.compile(r"(?:call|invoke) .*?@(\"[^\"]+\"|[\w.$]+)\(")
+_LONG_NAME = re.compile(r"""(%)("[^"]{200,}"|[\w.$-]{200,})()""")
+_LONG_LABEL = re.compile(r"""^()("[^"]{200,}"|[\w.$-]{200,})(:)""", re.MULTILINE)
 _WARNED = re.compile(r"stack frame size \((\d+)\) exceeds limit \(\d+\) in function '([^']+)'")
 
 
@@ -87,7 +89,8 @@ def _emitted(asked: dict[str, Any]) -> dict[str, Any]:
     _optimise(module, machine)
     text = str(module)
     refuse(asked["name"], text)
-    told = llvm.parse_assembly(_DEFINITION.sub(r'\1 "warn-stack-size"="0" {', text))
+    told = llvm.parse_assembly(_with_short_names(_DEFINITION.sub(r'\1 "warn-stack-size"="0" {', text)))
+    told.verify()
     calls = {
         function.name: sorted({found.strip('"') for found in _CALLED.findall(str(function))})
         for function in told.functions
@@ -133,7 +136,7 @@ def _machine(target: Target) -> llvm.TargetMachine:
 def _linked(texts: Iterable[str], target: Target, machine: llvm.TargetMachine) -> llvm.ModuleRef:
     modules = []
     for text in texts:
-        text = _HOST_ATTRIBUTES.sub("", text)
+        text = _with_short_names(_HOST_ATTRIBUTES.sub("", text))
         text = re.sub(r'^target (triple|datalayout) = ".*"\n', "", text, flags=re.MULTILINE)
         layout = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
         modules.append(llvm.parse_assembly(layout + text))
@@ -142,6 +145,16 @@ def _linked(texts: Iterable[str], target: Target, machine: llvm.TargetMachine) -
         first.link_in(other)
     first.verify()
     return first
+
+
+def _with_short_names(text: str) -> str:
+    """The same with names of blocks and values that LLVM does not cut off when it reads them, as it does from 1024 on."""
+    names: dict[str, str] = {}
+
+    def short(found: re.Match[str]) -> str:
+        return f"{found[1]}{names.setdefault(found[2], f'n.{len(names)}')}{found[3]}"
+
+    return _LONG_LABEL.sub(short, _LONG_NAME.sub(short, text))
 
 
 def _hide(module: llvm.ModuleRef, exported: set[str]) -> None:
