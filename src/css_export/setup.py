@@ -3,4 +3,4 @@
 
 from css_common.packaging import ros_package
 
-ros_package(__file__)
+ros_package(__file__, plugins={"sunpoint.stand_ins": ["library = css_export.stand_in:stand_in"]})

@@ -4,7 +4,7 @@
 The stream is made of records: a word of 64 bits says what comes, then comes it. STEP: the struct of inputs; BEGIN:
 nothing, the state is set up anew; PARAMETERS: the struct of parameters from now on. For each STEP the program writes
 the struct of outputs and a hash of the state after it (FNV-1a over its words of 64 bits), with an argument the state
-itself. All in the order of bytes of the processor.
+itself, at once. All in the order of bytes of the processor.
 """
 
 import struct
@@ -76,7 +76,7 @@ static int step_once(int with_state)
     if (fwrite(&output, sizeof output, 1, stdout) != 1 || fwrite(&hash, sizeof hash, 1, stdout) != 1) {{
         return 0;
     }}
-    return !with_state || fwrite(&state, sizeof state, 1, stdout) == 1;
+    return !with_state || (fwrite(&state, sizeof state, 1, stdout) == 1 && fflush(stdout) == 0);
 }}
 
 int main(int count, char **arguments)

@@ -7,18 +7,32 @@ from typing import Any
 from css_export.layout import FLAG, REAL, SINGLE, Scalar, Struct, leaves, pack
 from css_export.limits import Limit
 
+NEVER = "sunpoint_exception"
+"""Symbol that is called where an exception comes; code that still calls it must not fly."""
+
 # from so many numbers on a table in read-only data is shorter than the code that would store them
 _MOST_STORES = 1500
 
 
 def step_text(prefix: str, symbol: str) -> str:
-    """The step with C's calling convention, around the entry that numba made."""
+    """The step with C's calling convention, around the entry that numba made.
+
+    What an exception would call is nowhere: its call is still there after optimisation if an exception can come.
+    """
     return f"""
 declare i32 @"{symbol}"(ptr, ptr, ptr, ptr, ptr, ptr)
+declare void @{NEVER}(ptr)
 define void @{prefix}_step(ptr %p, ptr %s, ptr %i, ptr %o) nounwind {{
   %result = alloca ptr
   %exception = alloca ptr
   %status = call i32 @"{symbol}"(ptr %result, ptr %exception, ptr %p, ptr %s, ptr %i, ptr %o)
+  %raised = icmp ne i32 %status, 0
+  br i1 %raised, label %bad, label %good
+bad:
+  %what = load ptr, ptr %exception
+  call void @{NEVER}(ptr %what)
+  ret void
+good:
   ret void
 }}
 """

@@ -82,6 +82,18 @@ def compile_function(function: Function) -> Compiled:
     return Compiled(interface, overload.library.get_llvm_str(), overload.fndesc.llvm_func_name)
 
 
+def interface_of(function: Function, output: Any) -> Interface:
+    """The interface of a function, without compiling it.
+
+    Args:
+        function: the kernel.
+        output: type of numba of what it gives.
+    """
+    structs, fields = _structs(function, tuple(numba.typeof(value) for value in function.sample))
+    structs[OUTPUT] = output_struct(function, output)
+    return Interface(structs, tuple(fields), output)
+
+
 def _structs(function: Function, kinds: tuple[Any, ...]) -> tuple[dict[str, Struct], list[tuple[str, int]]]:
     """The structs of parameters, state and inputs, and where each argument is; that of outputs is known later."""
     layouts = [
@@ -90,10 +102,12 @@ def _structs(function: Function, kinds: tuple[Any, ...]) -> tuple[dict[str, Stru
     ]
     structs: dict[str, Struct] = {}
     fields = [("", 0)] * len(layouts)
-    (p,) = function.places(PARAMETERS) or (None,)
-    if p is not None:
-        structs[PARAMETERS] = _as_struct(layouts[p])
-        fields[p] = PARAMETERS, -1
+    (p,) = function.places(PARAMETERS)
+    parameters = layouts[p]
+    if not isinstance(parameters, Struct):
+        raise ExportError(f"{function.name}: its parameters are a {kinds[p]}, expected a NamedTuple")
+    structs[PARAMETERS] = parameters
+    fields[p] = PARAMETERS, -1
     for struct_role, roles in ((STATE, (STATE, MEMORY)), (INPUT, (INPUT,))):
         members: list[tuple[str, Layout]] = []
         for i, role in enumerate(function.roles):
@@ -121,10 +135,6 @@ def output_struct(function: Function, output: Any) -> Struct:
     else:
         members.append(("result", result))
     return struct_of(OUTPUT, members, lambda name: told.get(name, ""))
-
-
-def _as_struct(layout: Layout) -> Struct:
-    return layout if isinstance(layout, Struct) else struct_of(PARAMETERS, [("value", layout)])
 
 
 def _entry(

@@ -6,15 +6,18 @@ traces that an exception would leave.
 """
 
 import json
+import pickle
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import llvmlite.binding as llvm
 
+from css_export.data_text import NEVER
 from css_export.errors import ExportError
 from css_export.targets import Target
 
@@ -22,6 +25,7 @@ _FORBIDDEN = re.compile(r"^(numba_|NRT_|_?Py[A-Z_]|_?Z?numba|nrt_)")
 _ALLOCATION = {"malloc", "calloc", "realloc", "free", "aligned_alloc", "posix_memalign", "_Znwm", "_ZdlPv"}
 # what numba leaves of an exception: its pickled arguments
 _EXCEPTION = "picklebuf"
+_PICKLED = re.compile(r'^@\.const\.pickledata\.[0-9a-f]+ = .*? c"(.*)"', re.MULTILINE)
 _DECLARED = re.compile(r"^declare .*?@(\"[^\"]+\"|[\w.$]+)\(", re.MULTILINE)
 _HOST_ATTRIBUTES = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _DEFINITION = re.compile(r"^(define .*?) \{$", re.MULTILINE)
@@ -112,8 +116,22 @@ def refuse(name: str, text: str) -> None:
     bad = sorted(declared & _ALLOCATION)
     if bad:
         raise ExportError(f"{name}: allocates memory ({', '.join(bad)}); a kernel that flies has room given to it")
-    if _EXCEPTION in text:
-        raise ExportError(f"{name}: can raise an exception, for which nobody waits in flight")
+    if NEVER in declared or _EXCEPTION in text:
+        told = ", ".join(sorted(set(_exceptions(text)))) or "an exception"
+        raise ExportError(f"{name}: can raise {told}, for which nobody waits in flight")
+
+
+def _exceptions(text: str) -> Iterator[str]:
+    """The exceptions whose pickled arguments numba left in a module, each with the function that raises it."""
+    for found in _PICKLED.findall(text):
+        raw = re.sub(rb"\\([0-9A-Fa-f]{2})", lambda code: bytes([int(code[1], 16)]), found.encode())
+        try:
+            kind, arguments, place = pickle.loads(raw)  # what this process has compiled
+        except (pickle.UnpicklingError, ValueError, TypeError, EOFError):
+            continue
+        said = f" ({arguments[0]})" if arguments else ""
+        where = f" in {place[0]}, {Path(place[1]).name} line {place[2]}" if place else ""
+        yield f"{kind.__name__}{said}{where}"
 
 
 def _machine(target: Target) -> llvm.TargetMachine:

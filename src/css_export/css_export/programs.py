@@ -43,6 +43,17 @@ def compiled_program(target: Target, sources: list[Path], libraries: list[Path],
     return program
 
 
+def shared_library(target: Target, packed: Path, file: Path) -> Path:
+    """Links an archive into a shared library, as `fly --component` loads it.
+
+    Raises:
+        ToolError: the compiler is missing or refuses it.
+    """
+    whole = ["-Wl,--whole-archive", str(packed), "-Wl,--no-whole-archive"]
+    _run([target.compiler, *target.flags, "-shared", "-o", str(file), *whole, "-lm"])
+    return file
+
+
 def compiled_object(target: Target, source: Path, file: Path, *, cplusplus: bool = False) -> Path:
     """Compiles one file, warnings as errors.
 

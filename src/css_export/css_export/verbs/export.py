@@ -17,9 +17,9 @@ from css_export.build_files import write_build_files
 from css_export.errors import ExportError, ToolError
 from css_export.flown import flying_functions, functions_of, left_out
 from css_export.library import Library, MachineCode, made_library, write_library
-from css_export.programs import why_not
+from css_export.programs import can_link, shared_library, why_not
 from css_export.recorded_calls import Calls, listen
-from css_export.targets import Target, target_of
+from css_export.targets import HOST, Target, target_of
 from css_export.verification import Verdict, judged, run_library
 from css_recording.bag_reader import BagReader
 
@@ -62,6 +62,7 @@ def run(options: argparse.Namespace) -> int:
         place = folder / function.name
         write_library(library, codes, place)
         write_build_files(library, codes, place)
+        lines += _link_shared(library, codes, place)
         of_library = [Row(library, code) for code in codes]
         rows += of_library
         if options.verify is not None:
@@ -71,6 +72,18 @@ def run(options: argparse.Namespace) -> int:
     if options.json:
         print(json.dumps({"mission": mission.name, "results": [_result(row) for row in rows], "left_out": missing}))
     return 0 if all(row.is_right for row in rows) and not lines else 1
+
+
+def _link_shared(library: Library, codes: list[MachineCode], place: Path) -> list[str]:
+    """Makes the shared library for this machine, of what was made for it; why not."""
+    for code in codes:
+        if code.target.name != HOST:
+            continue
+        if not can_link(code.target):
+            return [f"{library.function.name}: no shared library for `fly --component`: {why_not(code.target)}"]
+        packed = place / HOST / f"lib{library.prefix}.a"
+        shared_library(code.target, packed, packed.with_suffix(".so"))
+    return []
 
 
 def _targets(names: Iterable[str]) -> list[Target]:
