@@ -53,7 +53,7 @@ def cmake(library: Library, codes: list[MachineCode]) -> str:
 cmake_minimum_required(VERSION 3.13)
 project({prefix} C)
 
-set(SUNPOINT_TARGET "{codes[0].target.name}" CACHE STRING "one of: {' '.join(code.target.name for code in codes)}")
+set(SUNPOINT_TARGET "{codes[0].target.name}" CACHE STRING "one of: {" ".join(code.target.name for code in codes)}")
 add_library({prefix} STATIC IMPORTED GLOBAL)
 set_target_properties({prefix} PROPERTIES
   IMPORTED_LOCATION "${{CMAKE_CURRENT_LIST_DIR}}/${{SUNPOINT_TARGET}}/lib{prefix}.a"
@@ -76,6 +76,7 @@ def page(library: Library, codes: list[MachineCode]) -> str:
         for c in codes
     )
     loose = sorted({limit.name.partition("[")[0] for limit in library.limits if not limit.declared})
+    named = ": " + ", ".join(f"`{name}`" for name in loose) if loose else ""
     return f"""# {prefix}
 
 {library.function.about}
@@ -111,7 +112,7 @@ at the start), one that was changed later does not change it.
 
 Parameters of your own (an uplink): copy `{prefix}_mission`, change members, ask `{prefix}_check`. It gives -1, or which
 row of `{prefix}_limits` is not kept. Members that are made of one parameter have that parameter's limits, as strict as
-the node's. Of others it asks that they are finite numbers{"" if not loose else ": " + ", ".join(f"`{n}`" for n in loose)}.
+the node's. Of others it asks that they are finite numbers{named}.
 What two parameters must be to each other is checked when the mission is read, not here.
 
 ## Sizes
@@ -124,8 +125,8 @@ linked comes to it. Loops are bounded by the numbers of cells and wheels and of 
 
 ## `{prefix}_main.c`
 
-Reads records from standard input, each a word of 64 bits and what belongs to it: 1, then `{prefix}_in`: one step; 2: the
-state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks. For each step it writes
+Reads records from standard input, each a word of 64 bits and what belongs to it: 1, then `{prefix}_in`: one step;
+2: the state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks. For each step it writes
 `{prefix}_out` and a hash of the state (FNV-1a over its words of 64 bits), with any argument the state itself.
 `make TARGET={codes[0].target.name}` builds it.
 {_bare(codes)}"""

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from css_common.schema import Table
 from css_export.sole_parameter import as_it_stands
 
 
@@ -24,7 +25,7 @@ def comments_of(source: Any) -> Callable[[str], str]:
 
 @cache
 def _of_class(source: type) -> dict[str, str]:
-    told = {}
+    told: dict[str, str] = {}
     for kind in reversed(source.__mro__):
         module = sys.modules.get(kind.__module__)
         if module is None or not hasattr(kind, "_fields"):
@@ -41,7 +42,7 @@ def _of_class(source: type) -> dict[str, str]:
 
 def _of_parameter(source: Any) -> str:
     """What is said of the one parameter that a field is made of; "" where there are several or none."""
-    table = getattr(source, "table", ())
+    table: Table = getattr(source, "table", ())
     if len(table) != 1:
         return ""
     (parameter,) = table

@@ -16,7 +16,7 @@ class Symbol(NamedTuple):
     defined: bool
     is_global: bool
     is_function: bool
-    size: int  # type: ignore[assignment]  # [bytes]
+    size: int  # [bytes]
 
 
 class Contents(NamedTuple):
@@ -66,7 +66,8 @@ def contents(data: bytes) -> Contents:
         if section.name.startswith(".data.rel.ro"):
             place = 1
         sizes[place] += section.size
-    return Contents(*sizes, tuple(_symbols(data, sections, wide, order)))
+    code, constants, variables = sizes
+    return Contents(code, constants, variables, tuple(_symbols(data, sections, wide, order)))
 
 
 def _sections(data: bytes, wide: bool, order: str) -> list[_Section]:

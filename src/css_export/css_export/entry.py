@@ -165,7 +165,7 @@ def _entry(
     else:
         text += "    give(o, result)\n"
     names["give"] = _giver(function, given)
-    exec(compile(text, f"<entry of {function.name}>", "exec"), names)  # noqa: S102  # the text is the one above
+    exec(compile(text, f"<entry of {function.name}>", "exec"), names)  # the text is the one above
     return names["entry"]
 
 
@@ -174,8 +174,8 @@ def _zeroing(function: Function, given: dict[str, Any]) -> Any:
     size = sum(_written_sizes(function))
 
     @intrinsic
-    def zero(typing_context, pointer):
-        def code(context, builder, signature, values):
+    def zero(typing_context, pointer) -> Any:
+        def code(context, builder, signature, values) -> Any:
             if size:
                 kind = ir.ArrayType(ir.IntType(8), size)
                 builder.store(ir.Constant(kind, None), builder.bitcast(values[0], kind.as_pointer()), align=1)
@@ -192,8 +192,8 @@ def _written_sizes(function: Function) -> list[int]:
 
 def _loader(kind: Any, value: Any, layout: Layout, offset: int) -> Any:
     @intrinsic
-    def load(typing_context, pointer):
-        def code(context, builder, signature, values):
+    def load(typing_context, pointer) -> Any:
+        def code(context, builder, signature, values) -> Any:
             return _loaded(context, builder, kind, value, layout, values[0], offset)
 
         return kind(pointer), code
@@ -210,11 +210,11 @@ def _loader_of_output(function: Function, kind: Any, value: Any, place: int, giv
 
 def _storer(kind: Any, layout: Layout, offset: int, where: str) -> Any:
     @intrinsic
-    def store(typing_context, pointer, given):
+    def store(typing_context, pointer, given) -> Any:
         if not typing_context.can_convert(given, kind):
             raise ExportError(f"{where}: of type {given} after a cycle, before it was {kind}")
 
-        def code(context, builder, signature, values):
+        def code(context, builder, signature, values) -> Any:
             value = context.cast(builder, values[1], signature.args[1], kind)
             _store(context, builder, kind, value, layout, values[0], offset)
             return context.get_dummy_value()
@@ -226,12 +226,12 @@ def _storer(kind: Any, layout: Layout, offset: int, where: str) -> Any:
 
 def _giver(function: Function, known: dict[str, Any]) -> Any:
     @intrinsic
-    def give(typing_context, pointer, output):
+    def give(typing_context, pointer, output) -> Any:
         struct = output_struct(function, output)
         known["struct"], known["type"] = struct, output
         first = len(function.places(OUTPUT))
 
-        def code(context, builder, signature, values):
+        def code(context, builder, signature, values) -> Any:
             if isinstance(layout_of(output, None, "", comments_of), Struct):
                 for i, part in enumerate(output.types):
                     field = struct.fields[first + i]

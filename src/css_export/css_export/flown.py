@@ -10,26 +10,24 @@ from typing import Any
 
 import numpy as np
 
-from css_common.component import Component
+from css_common.component import Component, Plant
 from css_common.mission import Mission, Node
-from css_common.schema import unknown_name
+from css_common.schema import Values, unknown_name
 from css_environment.earth_light import new_light
 from css_estimation.attitude.flight_references import References
 from css_estimation.health import watched
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.nodes.slit_sun_angle import SlitPassages
-from css_estimation.nodes.triad import Triad
 from css_estimation.spin import slit_measurement, slit_passage
 from css_estimation.sun.heading_dispatch import estimate_heading, home_of
-from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_estimator import SunEstimator, hears_wheels
 from css_estimation.sun.sun_heading import UNKNOWN_SKY, Aiding
 from css_export.errors import ExportError
-from sunpoint_control.control_algorithm import ControlAlgorithm
 from sunpoint_control.controller import Controller
 from sunpoint_control.held_field import NO_FIELD_MEASURED
 
+_ZERO = (0.0, 0.0, 0.0)
 PARAMETERS, STATE, MEMORY, INPUT, OUTPUT = "params", "state", "memory", "in", "out"
 
 
@@ -94,8 +92,6 @@ def flying_functions(mission: Mission, names: Iterable[str] = ()) -> list[Functi
 
 def left_out(mission: Mission) -> list[str]:
     """Components of a mission that belong to what flies and have no function to export."""
-    from css_common.component import Plant
-
     return [
         node.name
         for node in mission.nodes
@@ -124,9 +120,6 @@ def _sun_estimator(node: Node) -> Iterator[Function]:
             f"{node.name}: its parameters are of the type of another algorithm, so that no compiled function has both "
             "it and the health of its sensors; give it a type of its own"
         )
-    speeds = np.zeros(len(values.wheels.axes) if hears_wheels(values) else 0)
-    zero = (0.0, 0.0, 0.0)
-    aiding = Aiding(zero, False, zero, False, speeds, False, UNKNOWN_SKY)
     yield Function(
         node.name,
         node.name,
@@ -139,7 +132,7 @@ def _sun_estimator(node: Node) -> Iterator[Function]:
             watched.initial_memory(algorithm, p),
             0.0,
             np.zeros(len(values.cells.normals)),
-            aiding,
+            _unaided(values),
         ),
         True,
         "_step",
@@ -154,40 +147,30 @@ def _sun_estimator(node: Node) -> Iterator[Function]:
 
 def _earthlight(node: Node) -> Iterator[Function]:
     algorithm: Any = Earthlight.algorithm
-    made = next(_sun_estimator_like(node, algorithm))
-    yield made
-
-
-def _sun_estimator_like(node: Node, algorithm: Any) -> Iterator[Function]:
     p = algorithm.parameters(node.values)
-    speeds = np.zeros(len(node.values.wheels.axes) if hears_wheels(node.values) else 0)
-    zero = (0.0, 0.0, 0.0)
-    sample = (
-        p,
-        algorithm.initial_state(p),
-        algorithm.initial_memory(p),
-        0.0,
-        np.zeros(len(node.values.cells.normals)),
-        Aiding(zero, False, zero, False, speeds, False, UNKNOWN_SKY),
-    )
-    roles = (PARAMETERS, STATE, MEMORY, INPUT, INPUT, INPUT)
-    yield _stepped(node, algorithm.step, roles, sample)
+    voltages = np.zeros(len(node.values.cells.normals))
+    sample = (p, algorithm.initial_state(p), algorithm.initial_memory(p), 0.0, voltages, _unaided(node.values))
+    yield _stepped(node, algorithm.step, (PARAMETERS, STATE, MEMORY, INPUT, INPUT, INPUT), sample)
+
+
+def _unaided(values: Values) -> Aiding:
+    speeds = np.zeros(len(values.wheels.axes) if hears_wheels(values) else 0)
+    return Aiding(_ZERO, False, _ZERO, False, speeds, False, UNKNOWN_SKY)
 
 
 def _attitude_filter(node: Node) -> Iterator[Function]:
     algorithm: Any = getattr(node.component, "algorithm")  # noqa: B009
     p = algorithm.parameters(node.values)
-    zero = (0.0, 0.0, 0.0)
-    references = References(*(_zero_of(kind) for kind in References.__annotations__.values()))
+    references = References(_ZERO, 0.0, False, _ZERO)
     sample = (
         p,
         algorithm.initial_state(p),
         algorithm.initial_memory(p),
         0.0,
         np.zeros(len(node.values.cells.normals)),
-        zero,
+        _ZERO,
         False,
-        zero,
+        _ZERO,
         False,
         references,
         new_light(),
@@ -195,14 +178,9 @@ def _attitude_filter(node: Node) -> Iterator[Function]:
     yield _stepped(node, algorithm.step, (PARAMETERS, STATE, MEMORY, *[INPUT] * 8), sample)
 
 
-def _zero_of(kind: Any) -> Any:
-    return {float: 0.0, int: 0, bool: False}.get(kind, (0.0, 0.0, 0.0))
-
-
 def _controller(node: Node) -> Iterator[Function]:
     algorithm: Any = getattr(node.component, "algorithm")  # noqa: B009
     p = algorithm.parameters(node.values)
-    zero = (0.0, 0.0, 0.0)
     turns = getattr(node.component, "turns_wheels")  # noqa: B009
     wheels = np.zeros(len(node.values.wheels.axes) if turns else 0)
     sample = (
@@ -210,10 +188,10 @@ def _controller(node: Node) -> Iterator[Function]:
         algorithm.initial_state(p),
         algorithm.initial_memory(p),
         0.0,
-        zero,
+        _ZERO,
         0,
         0,
-        zero,
+        _ZERO,
         0,
         wheels,
         NO_FIELD_MEASURED,
@@ -274,9 +252,7 @@ def _stepped(
     told = documented(kernel.py_func) | (docs or {})
     told.setdefault("dt", "[s] since the last step")
     arguments = tuple(inspect.signature(kernel.py_func).parameters)
-    return Function(
-        node.name, node.name, kernel, roles, arguments, sample, True, "_step", _about(node.component), told
-    )
+    return Function(node.name, node.name, kernel, roles, arguments, sample, True, "_step", _about(node.component), told)
 
 
 def _about(source: Any) -> str:

@@ -32,7 +32,7 @@ class Scalar:
 
     @property
     def alignment(self) -> int:
-        """[bytes]"""
+        """In bytes."""
         return self.size
 
 
@@ -45,12 +45,12 @@ class Array:
 
     @property
     def size(self) -> int:
-        """[bytes]"""
+        """In bytes."""
         return self.element.size * self.count
 
     @property
     def alignment(self) -> int:
-        """[bytes]"""
+        """In bytes."""
         return self.element.alignment
 
 
@@ -87,9 +87,7 @@ FLAG = Scalar("uint8_t", "?", 1)
 NOTHING = Struct("nothing", (), 0, 1)
 _SCALARS = {"d": REAL, "f": SINGLE, "?": FLAG}
 _SCALARS |= {code: Scalar(f"int{8 * size}_t", code, size) for code, size in (("b", 1), ("h", 2), ("i", 4), ("q", 8))}
-_SCALARS |= {
-    code: Scalar(f"uint{8 * size}_t", code, size) for code, size in (("B", 1), ("H", 2), ("I", 4), ("Q", 8))
-}
+_SCALARS |= {code: Scalar(f"uint{8 * size}_t", code, size) for code, size in (("B", 1), ("H", 2), ("I", 4), ("Q", 8))}
 _INTEGERS = {(True, 1): "b", (True, 2): "h", (True, 4): "i", (True, 8): "q"}
 _INTEGERS |= {(False, size): code.upper() for (_, size), code in list(_INTEGERS.items())}
 
@@ -127,20 +125,23 @@ def layout_of(kind: Any, value: Any, where: str, comments: Callable[[Any], Calla
     if isinstance(kind, types.Float):
         return REAL if kind.bitwidth == 64 else SINGLE
     if isinstance(kind, types.Integer):
-        return _SCALARS[_INTEGERS[kind.signed, kind.bitwidth // 8]]
+        number: Any = kind
+        return _SCALARS[_INTEGERS[number.signed, number.bitwidth // 8]]
     if isinstance(kind, types.Array) and value is not None:
         return _layout_of_array(kind, value, where, comments)
     if isinstance(kind, types.BaseNamedTuple):
-        source = kind.instance_class
+        named: Any = kind
+        source = named.instance_class
         members = [
             (name, layout_of(part, None if value is None else value[i], f"{where}.{name}", comments))
-            for i, (name, part) in enumerate(zip(kind.fields, kind.types, strict=True))
+            for i, (name, part) in enumerate(zip(named.fields, named.types, strict=True))
         ]
         return struct_of(source.__name__.lstrip("_"), members, comments(source))
     if isinstance(kind, types.BaseTuple):
+        several: Any = kind
         parts = [
             layout_of(part, None if value is None else value[i], f"{where}[{i}]", comments)
-            for i, part in enumerate(kind.types)
+            for i, part in enumerate(several.types)
         ]
         if all(part == parts[0] for part in parts):
             return Array(parts[0], len(parts)) if parts else NOTHING
@@ -218,12 +219,12 @@ def unpack(layout: Layout, like: Any, data: bytes | bytearray | memoryview, at: 
         return None
     if isinstance(like, np.ndarray):
         return np.frombuffer(data, like.dtype, like.size, at).reshape(like.shape).copy()
-    parts = like.types if isinstance(like, types.BaseTuple) else like
+    parts: Any = getattr(like, "types", like)
     if isinstance(layout, Array):
         size = layout.element.size
         return tuple(unpack(layout.element, parts[i], data, at + i * size) for i in range(layout.count))
     made = [unpack(f.layout, part, data, at + f.offset) for f, part in zip(layout.fields, parts, strict=True)]
-    source = like.instance_class if isinstance(like, types.BaseNamedTuple) else type(like)
+    source: Any = getattr(like, "instance_class", type(like))
     return source(*made) if hasattr(source, "_fields") else tuple(made)
 
 

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
-from css_common.schema import Parameter
+from css_common.schema import Parameter, Table
 from css_export.layout import Layout, Scalar, Struct, leaves
 from css_export.sole_parameter import Only, as_it_stands
 
@@ -93,7 +93,7 @@ def _joined(limits: list[Limit]) -> list[Limit]:
 
 def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
     """Unit, least and largest value of a field that hangs on one parameter; None where that says nothing."""
-    table = getattr(source, "table", ())
+    table: Table = getattr(source, "table", ())
     if len(table) != 1 or not isinstance(value, (bool, int, float)):
         return None
     (parameter,) = table

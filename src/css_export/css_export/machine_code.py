@@ -166,7 +166,7 @@ def _linked(texts: Iterable[str], target: Target, machine: llvm.TargetMachine) -
 
 
 def _with_short_names(text: str) -> str:
-    """The same with names of blocks and values that LLVM does not cut off when it reads them, as it does from 1024 on."""
+    """The same with names of blocks and values that LLVM reads whole; it cuts off those beyond 1024 characters."""
     names: dict[str, str] = {}
 
     def short(found: re.Match[str]) -> str:

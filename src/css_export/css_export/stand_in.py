@@ -21,7 +21,7 @@ from css_common.mission import Node
 from css_export.c_main import BEGIN, PARAMETERS, STEP, word
 from css_export.entry import Interface, interface_of
 from css_export.errors import ExportError
-from css_export.flown import INPUT, MEMORY, OUTPUT, Function, functions_of, fresh
+from css_export.flown import INPUT, MEMORY, OUTPUT, Function, fresh, functions_of
 from css_export.flown import PARAMETERS as PARAMETERS_ROLE
 from css_export.flown import STATE as STATE_ROLE
 from css_export.layout import Struct, pack, unpack
@@ -157,7 +157,7 @@ def stand_in(node: Node, file: str) -> type[Component]:
     def around(kernel: Callable[..., Any]) -> Callable[..., Any]:
         return _Step(function, kernel, path, kind)
 
-    class StandIn(node.component):  # type: ignore[misc,name-defined]
+    class StandIn(node.component):  # type: ignore[name-defined]
         """A component with a library in it."""
 
         def __init__(self, *arguments: Any) -> None:

@@ -164,7 +164,9 @@ def _print(rows: list[Row], verified: bool, folder: Path, lines: list[str], miss
     console.print(table)
     for row in rows:
         if row.why_not is not None:
-            console.print(f"{row.library.function.name} on {row.code.target.name}: not run: {row.why_not}", soft_wrap=True)
+            console.print(
+                f"{row.library.function.name} on {row.code.target.name}: not run: {row.why_not}", soft_wrap=True
+            )
     for line in lines:
         console.print(line, soft_wrap=True)
     for library in {row.library.prefix: row.library for row in rows}.values():
