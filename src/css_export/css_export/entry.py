@@ -19,6 +19,7 @@ from numba.np.arrayobj import make_array, populate_array
 from css_export.comments import comments_of
 from css_export.errors import ExportError
 from css_export.flown import INPUT, MEMORY, OUTPUT, PARAMETERS, STATE, Function
+from css_export.intermediate import kept_modules
 from css_export.layout import Array, Layout, Scalar, Struct, layout_of, struct_of
 
 POINTER = types.CPointer(types.uint8)
@@ -73,13 +74,14 @@ def compile_function(function: Function) -> Compiled:
     signature = types.void(POINTER, POINTER, POINTER, POINTER)
     try:
         dispatcher: Any = numba.njit(**_OPTIONS)(entry)
-        dispatcher.compile(signature.args)
+        with kept_modules() as texts:
+            dispatcher.compile(signature.args)
     except numba.core.errors.NumbaError as error:
         raise ExportError(f"{function.name}: not compiled: {str(error).strip().splitlines()[0]}") from error
     overload = dispatcher.overloads[signature.args]
     structs[OUTPUT] = given["struct"]
     interface = Interface(structs, tuple(fields), given["type"])
-    return Compiled(interface, overload.library.get_llvm_str(), overload.fndesc.llvm_func_name)
+    return Compiled(interface, texts[overload.library.name], overload.fndesc.llvm_func_name)
 
 
 def interface_of(function: Function, output: Any) -> Interface:

@@ -16,6 +16,7 @@ from css_common.mission import Mission, load_mission, mission_from_text
 from css_export.build_files import write_build_files
 from css_export.errors import ExportError, ToolError
 from css_export.flown import flying_functions, functions_of, left_out
+from css_export.glue import write_glue
 from css_export.library import Library, MachineCode, made_library, write_library
 from css_export.programs import can_link, shared_library, why_not
 from css_export.recorded_calls import Calls, listen
@@ -62,6 +63,7 @@ def run(options: argparse.Namespace) -> int:
         place = folder / function.name
         write_library(library, codes, place)
         write_build_files(library, codes, place)
+        write_glue(library, place)
         lines += _link_shared(library, codes, place)
         of_library = [Row(library, code) for code in codes]
         rows += of_library
