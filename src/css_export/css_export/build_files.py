@@ -127,7 +127,7 @@ linked comes to it. Loops are bounded by the numbers of cells and wheels and of 
 
 Reads records from standard input, each a word of 64 bits and what belongs to it: 1, then `{prefix}_in`: one step;
 2: the state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks. For each step it writes
-`{prefix}_out` and a hash of the state (FNV-1a over its words of 64 bits), with any argument the state itself.
+`{prefix}_out` and a hash of the state (`hash_of_state`), with any argument the state itself.
 `make TARGET={codes[0].target.name}` builds it.
 {_bare(codes)}"""
 

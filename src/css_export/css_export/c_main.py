@@ -3,19 +3,20 @@
 
 The stream is made of records: a word of 64 bits says what comes, then comes it. STEP: the struct of inputs; BEGIN:
 nothing, the state is set up anew; PARAMETERS: the struct of parameters from now on. For each STEP the program writes
-the struct of outputs and a hash of the state after it (FNV-1a over its words of 64 bits), with an argument the state
-itself, at once. All in the order of bytes of the processor.
+the struct of outputs and a hash of the state after it, with an argument the state itself, at once. All in the order of
+bytes of the processor.
+
+The hash is the sum, modulo 2^64, of (2 i + 1) m(w) over the words w of 64 bits of the state, with the mixing step
+m(w) = (w ^ w >> 29) 0xbf58476d1ce4e5b9: every word counts, and so does its place.
 """
 
 import struct
 
 import numpy as np
 
-from css_common.kernel import outer_kernel
-
 STEP, BEGIN, PARAMETERS = 1, 2, 3
-HASH_START = 0xCBF29CE484222325
-_PRIME = 0x100000001B3
+_MIX = np.uint64(0xBF58476D1CE4E5B9)
+_SHIFT = np.uint64(29)
 
 
 def word(command: int) -> bytes:
@@ -23,18 +24,11 @@ def word(command: int) -> bytes:
     return struct.pack("<Q", command)
 
 
-@outer_kernel
-def _hash(words) -> np.uint64:
-    value = np.uint64(0xCBF29CE484222325)
-    for k in range(words.shape[0]):
-        value = (value ^ words[k]) * np.uint64(0x100000001B3)
-    return value
-
-
 def state_hash(state: bytes | bytearray) -> int:
     """The hash of a state, whose last word is filled up with zeros."""
-    padded = bytes(state) + bytes(-len(state) % 8)
-    return int(_hash(np.frombuffer(padded, np.uint64)))
+    words = np.frombuffer(bytes(state) + bytes(-len(state) % 8), np.uint64)
+    places = 2 * np.arange(len(words), dtype=np.uint64) + np.uint64(1)
+    return int(np.sum(places * ((words ^ (words >> _SHIFT)) * _MIX), dtype=np.uint64))
 
 
 def main_text(prefix: str) -> str:
@@ -54,12 +48,12 @@ static {prefix}_out output;
 static uint64_t hash_of_state(void)
 {{
     const unsigned char *bytes = (const unsigned char *)&state;
-    uint64_t value = 0xcbf29ce484222325u;
+    uint64_t value = 0;
     size_t at;
     for (at = 0; at < sizeof state; at += 8) {{
         uint64_t word = 0;
         memcpy(&word, bytes + at, sizeof state - at < 8 ? sizeof state - at : 8);
-        value = (value ^ word) * 0x100000001b3u;
+        value += (2u * (at / 8) + 1u) * ((word ^ (word >> 29)) * 0xbf58476d1ce4e5b9u);
     }}
     return value;
 }}
