@@ -43,14 +43,14 @@ def compiled_program(target: Target, sources: list[Path], libraries: list[Path],
     return program
 
 
-def shared_library(target: Target, packed: Path, file: Path) -> Path:
-    """Links an archive into a shared library, as `fly --component` loads it.
+def shared_library(target: Target, source: Path, file: Path) -> Path:
+    """Makes a shared library of an archive or of a source file, as `fly --component` loads it.
 
     Raises:
         ToolError: the compiler is missing or refuses it.
     """
-    whole = ["-Wl,--whole-archive", str(packed), "-Wl,--no-whole-archive"]
-    _run([target.compiler, *target.flags, "-shared", "-o", str(file), *whole, "-lm"])
+    whole = ["-Wl,--whole-archive", str(source), "-Wl,--no-whole-archive"]
+    _run([target.compiler, *WARNINGS, *target.flags, "-shared", "-fPIC", "-o", str(file), *whole, "-lm"])
     return file
 
 

@@ -49,12 +49,7 @@ class SharedLibrary:
         Raises:
             ExportError: it cannot be loaded, or lacks the step.
         """
-        try:
-            library = ctypes.CDLL(str(file.absolute()))
-            self._step = getattr(library, f"{prefix}_step")
-        except (OSError, AttributeError) as error:
-            raise ExportError(f"{file}: {error}") from error
-        self._step.restype = None
+        self._step = loaded_step(file, prefix)
         self._outputs = structs[OUTPUT].size
 
     def step(self, parameters: bytes, state: bytes, inputs: bytes) -> tuple[bytes, bytes]:
@@ -62,6 +57,20 @@ class SharedLibrary:
         places = [_place(data) for data in (parameters, state, inputs, bytes(self._outputs))]
         self._step(*(ctypes.c_void_p(place.ctypes.data) for place in places))
         return places[1].tobytes(), places[3].tobytes()
+
+
+def loaded_step(file: Path, prefix: str) -> Any:
+    """The step of a shared library.
+
+    Raises:
+        ExportError: it cannot be loaded, or lacks it.
+    """
+    try:
+        step = getattr(ctypes.CDLL(str(file.absolute())), f"{prefix}_step")
+    except (OSError, AttributeError) as error:
+        raise ExportError(f"{file}: {error}") from error
+    step.restype = None
+    return step
 
 
 def _place(data: bytes) -> np.ndarray:
@@ -153,6 +162,8 @@ def stand_in(node: Node, file: str) -> type[Component]:
     if not path.is_file():
         raise ExportError(f"--component {node.name}: {file}: no such file")
     kind = _elf_kind(path)
+    if path.suffix == ".so":
+        loaded_step(path, prefix_of(function.name))
 
     def around(kernel: Callable[..., Any]) -> Callable[..., Any]:
         return _Step(function, kernel, path, kind)
