@@ -49,6 +49,7 @@ VERBS = {
     "layout": Verb("search where the cells should look: error against number of cells", "css_design", "layout"),
     "budget": Verb("split heading and pointing error by source: predicted, and measured", "css_design", "budget"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
+    "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
     "test": Verb("run the linters and all tests, or with arguments those tests alone", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
