@@ -25,10 +25,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
-from faulted_cells import FAULTS, MISSIONS, faulted  # noqa: E402
-from uncalibrated import flown, without_truth  # noqa: E402
+from faulted_cells import FAULTS, MISSIONS, faulted
+from uncalibrated import flown, without_truth
 
-from css_calibration.check import HEALTHY, check  # noqa: E402
+from css_calibration.check import HEALTHY, check
 
 
 def main() -> int:

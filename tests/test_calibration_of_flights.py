@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from synthetic_flight import record
 from uncalibrated import (
     Flown,
     flown,
@@ -27,7 +28,6 @@ from css_common.mission import load_mission
 from css_common.mission_extends import sections_alone
 from css_monte_carlo.mission_parts import NoPlace, parts_of
 from css_msgs.msg import CssVoltages, SpacecraftState
-from synthetic_flight import record
 
 THIN = 3
 

@@ -12,8 +12,8 @@ import pyarrow as pa
 
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
-from css_monte_carlo.case_missions import drawn_columns
 from css_common.processors import usable_processors
+from css_monte_carlo.case_missions import drawn_columns
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import Tallies
 from css_monte_carlo.drawn_faults import COLUMN, fault_column, has_faults
