@@ -31,16 +31,25 @@ VERBS = {
     ),
     "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly", ros=True),
     "replay": Verb("step estimators over a recorded bag and compare", "css_bringup", "replay"),
+    "hil": Verb(
+        "fly a mission in real time with a board in the loop, over serial or UDP", "css_bringup", "hil", ros=True
+    ),
     "bench": Verb(
         "measure the speed of the graph, and of the Monte Carlo beside Basilisk", "css_bringup", "bench", ros=True
     ),
     "record": Verb("record topics into an MCAP bag", "css_recording", "recorder", ros=True),
     "play": Verb("play a bag onto live topics", "css_recording", "player", ros=True),
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
-    "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
+    "import-csv": Verb("turn a table of measurements into a bag", "css_telemetry", "import_csv"),
+    "calibrate": Verb("calibrate cells, magnetometer and gyro from a bag", "css_calibration", "calibrate"),
+    "check": Verb("find the cells of a bag that lie", "css_calibration", "check"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
+    "new": Verb("write the mission of your own spacecraft: gains, gates and steps computed", "css_design", "new"),
+    "layout": Verb("search where the cells should look: error against number of cells", "css_design", "layout"),
+    "budget": Verb("split heading and pointing error by source: predicted, and measured", "css_design", "budget"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
+    "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
     "test": Verb("run the linters and all tests, or with arguments those tests alone", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
