@@ -141,6 +141,7 @@ def replayed(bag: Path, capsys, *estimators: str) -> dict:
     return json.loads(capsys.readouterr().out.splitlines()[-1])
 
 
+@pytest.mark.timeout(1500)  # compiles seven estimators where none is in the cache
 def test_all_of_it_reaches_the_estimators(report, capsys):
     names = ["attitude_filter", "triad", "flat", "ekf", "wavg", "wls", "sun_filter"]
     result = replayed(report.recording, capsys, *names)
