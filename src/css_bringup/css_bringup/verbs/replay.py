@@ -12,6 +12,7 @@ from css_bringup.replay_verdict import is_rounding
 from css_bringup.replayed import Replayed
 from css_bringup.report import print_json
 from css_common.command import FAILED
+from css_common.mission_extends import sections_alone
 from css_common.mission_file import MissionError
 from css_common.progress_lines import still_working
 
@@ -21,6 +22,8 @@ def run(arguments: argparse.Namespace) -> int:
     remap = dict(_remapping(item) for item in arguments.remap)
     requests = [parse_request(text) for text in arguments.estimators]
     mission = mission_of_bag(arguments.bag, remap, arguments.overrides, arguments.mission)
+    if arguments.calibration is not None:
+        mission = mission.with_sections(sections_alone(arguments.calibration))
     out = arguments.out or default_replay(arguments.bag, overwrite=arguments.overwrite)
     with still_working(f"replaying {arguments.bag}"):
         result = replay(
