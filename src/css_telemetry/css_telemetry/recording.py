@@ -110,6 +110,9 @@ def mission_text(
         "io.inertial_frame": INERTIAL_FRAME,
         "io.largest_gap": max(_LARGEST_GAP_S, 2.0 * largest_step_s),
     }
+    if any(cell.field_of_view_deg is not None for cell in description.cells):
+        usual = description.field_of_view_deg or USUAL_VIEW_DEG
+        entries["cells.fields_of_view_deg"] = [cell.field_of_view_deg or usual for cell in description.cells]
     if description.inertia:
         entries["spacecraft.inertia"] = list(description.inertia)
     wheels = description.aiding.wheels if description.aiding is not None else None
