@@ -109,7 +109,7 @@ def test_what_the_import_says(report):
     assert report.states is not None and report.states.known == ("sun", "attitude", "position", "illumination")
     assert report.messages == {
         "/truth": LINES, "/css/voltages": LINES, "/gyro/imu": LINES, "/mag/field": LINES, "/wheels/state": LINES,
-        "/temperature/temp": LINES,
+        "/css/temperature": LINES,
     }  # fmt: skip
     _, r_n, sun_n, flux, field_n, attitude = motion()
     telemetry = report.telemetry
