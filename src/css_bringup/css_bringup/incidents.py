@@ -3,7 +3,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from css_common.host import REJECTED, STRANGER
+from css_common.edge import REJECTED, STRANGER
 from css_common.mission import Mission
 from css_drivers import hil_exchange
 

@@ -24,6 +24,11 @@ HISTORY = 100
 ANSWERED_AGAIN = "answered_again"
 """A restarted sender repeats what its predecessor sent: left out, but no fault."""
 
+REJECTED = ".rejected."
+"""Between an input and the kind of refusal, in the names of counters."""
+STRANGER = ".stranger."
+"""Between a topic and the node that wrote it besides the one that is heard, in the names of counters."""
+
 _CONFIRMATIONS = 3
 CONFIRMATIONS_BACK = 10
 

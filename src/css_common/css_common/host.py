@@ -29,7 +29,7 @@ from css_common import process_faults, ros_parameters
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Outgoing, Output, Plant, Standing
 from css_common.diagnostics import Diagnostics, Health
-from css_common.edge import Edge
+from css_common.edge import REJECTED, STRANGER, Edge
 from css_common.fault_services import FaultServices
 from css_common.link_kinds import LINK_FAULTS
 from css_common.matching import Matcher
@@ -43,11 +43,6 @@ from css_common.sole_subscription import SoleSubscription
 from css_common.stepping import Stepper, conflict
 from css_common.supervised import announced_before
 from css_common.writers import writer_choice
-
-REJECTED = ".rejected."
-"""Between an input and the kind of refusal, in the names of counters."""
-STRANGER = ".stranger."
-"""Between a topic and the node that wrote it besides the one that is heard, in the names of counters."""
 
 _SUCCESS = TransitionCallbackReturn.SUCCESS
 _FAILURE = TransitionCallbackReturn.FAILURE

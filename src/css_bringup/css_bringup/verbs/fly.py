@@ -16,6 +16,7 @@ from css_bringup.mission_asked_for import mission_of
 from css_bringup.options import complain, console, errors
 from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_bringup.stand_ins import stand_ins
 from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
@@ -27,6 +28,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.realtime is not None:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
+    components = stand_ins(mission, arguments.components)
+    for text in arguments.components:
+        console.print(f"in the place of a compiled function: {text}", soft_wrap=True)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
     nodes = [*(node.name for node in mission.nodes), RECORDER]
     enclaves = security.enclaves_of(nodes, arguments.processes)
@@ -34,7 +38,14 @@ def run(arguments: argparse.Namespace) -> int:
         security.enforced(os.environ, arguments.security, enclaves),
         own_domain(mission, arguments.domain, bag, console) as domain,
     ):
-        result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+        result = fly(
+            mission,
+            bag,
+            processes=arguments.processes,
+            console=console,
+            overwrite=arguments.overwrite,
+            stand_ins=components,
+        )
     result.domain = domain
     return conclude(mission, result, as_json=arguments.json)
 
