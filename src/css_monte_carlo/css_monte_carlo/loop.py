@@ -135,7 +135,7 @@ def fly_block(
             wheels, felt_torque, felt_dipole = felt
         body = RigidBody(inertia, inverse, wheels, v.craft.body.substeps)
         disturbances = with_dipole(v.craft.disturbances, row(cases.dipole, c))
-        craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipole, v.craft.disturbed)
+        craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipoles, v.craft.disturbed)
         key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
         cells = CellsOfCase(cases.cells[c], faults, cases.albedo[c], cases.work[c])
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)

@@ -24,6 +24,7 @@ from css_common.sections import (
     WHEEL_MAX_SPEED,
     WHEEL_MAX_TORQUE,
     WHEELS_FITTED,
+    of_each_wheel,
     wheel_axes,
 )
 from css_common.vectors import Vec3
@@ -165,7 +166,7 @@ def _torque_findings(values: Values) -> Iterator[Finding]:
 
 
 def _wheel_findings(values: Values, controlled: bool) -> Iterator[Finding]:
-    limit, given = values[WHEEL_MAX_SPEED], values[WHEEL_SPEEDS]
+    limit, given = float(np.min(of_each_wheel(values, WHEEL_MAX_SPEED))), values[WHEEL_SPEEDS]
     first = float(np.max(np.abs(given), initial=0.0))
     needed = first + _needed_speed_rpm(values)
     if first >= _NEARLY_FULL * limit:
@@ -184,5 +185,6 @@ def _needed_speed_rpm(values: Values) -> float:
     """Largest speed of a wheel when all have taken up the body's first momentum, over the signs of its rates."""
     _, rates = _first_rates(values)
     share = np.linalg.pinv(wheel_axes(values).T) @ values[INERTIA]
-    momenta = [np.max(np.abs(share @ (rates * signs))) for signs in itertools.product((1.0, -1.0), repeat=3)]
-    return float(max(momenta)) / values[WHEEL_INERTIA] / _RADIANS_PER_RPM
+    inertias = of_each_wheel(values, WHEEL_INERTIA)
+    speeds = [np.max(np.abs(share @ (rates * signs)) / inertias) for signs in itertools.product((1.0, -1.0), repeat=3)]
+    return float(max(speeds)) / _RADIANS_PER_RPM

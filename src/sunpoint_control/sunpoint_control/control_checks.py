@@ -9,6 +9,7 @@ import numpy as np
 from css_common.component import Finding, Plant, Smoothing
 from css_common.mission import Node
 from css_common.schema import Values
+from css_common.sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
 from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
 from sunpoint_control.wheel_allocation import pseudo_inverse
 
@@ -20,17 +21,20 @@ def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]
     """What the gains and wheels of a control node do in a mission's graph."""
     values = node.values
     model = loop_model(values, graph)
-    if values.wheels.max_torque == 0.0:
+    if not np.any(of_each_wheel(values, WHEEL_MAX_TORQUE)):
         yield Finding("wheels.max_torque: 0 given, expected a torque above 0: the wheels cannot turn the body")
     turned = np.linalg.matrix_rank(model.authority, tol=1e-6)
     if turned < 3:
         yield Finding(f"wheels_out: the wheels that are left turn the body about {turned} of 3 axes, expected all")
     speeds = pseudo_inverse(np.asarray(values.wheels.axes), values.wheels_out) @ values.dumping.momentum
-    fastest = float(np.max(np.abs(speeds))) / values.wheels.inertia * 30.0 / np.pi
-    if values.dumping.enabled and fastest > values.wheels.max_speed_rpm:
+    rpm = np.abs(speeds) / of_each_wheel(values, WHEEL_INERTIA) * 30.0 / np.pi
+    limits = of_each_wheel(values, WHEEL_MAX_SPEED)
+    worst = int(np.argmax(rpm - limits))
+    fastest = float(rpm[worst])
+    if values.dumping.enabled and fastest > limits[worst]:
         yield Finding(
             f"dumping.momentum: takes {fastest:.0f} rpm of a wheel, expected at most wheels.max_speed_rpm "
-            f"{values.wheels.max_speed_rpm:g}"
+            f"{limits[worst]:g}"
         )
     yield from _dumping_findings(values)
     turned_in_cycle = abs(values.reference.spin_deg_s) * model.period

@@ -8,6 +8,7 @@ import numpy as np
 
 from css_common.component import Finding, Plant
 from css_common.mission import Node
+from css_common.sections import rod_max_dipoles
 from sunpoint_control.magnetic_control import parameters
 
 _LARGEST_LAG = math.radians(60.0)  # half of the damping is left
@@ -22,7 +23,7 @@ _UNSTABLE_STEP = 2.0
 def magnetic_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
     """What is wrong with rods, field and gains of a magnetic control in a mission's graph."""
     values = node.values
-    if values.rods.max_dipole == 0.0:
+    if not np.any(rod_max_dipoles(values)):
         yield Finding("rods.max_dipole: 0 given, expected a dipole above 0: the rods cannot turn the body")
     simulated = any(issubclass(other.component, Plant) for other in graph.values())
     measured = any(output.topic == "mag/field" for other in graph.values() for output in other.outputs)
