@@ -76,8 +76,8 @@ def test_surroundings_are_shared_where_nothing_changes_them():
     flight = MissionFlight(mission(*DISPERSED), "ekf")
     shared, alone = flight.around_case(2), MissionFlight(drawn(mission(*DISPERSED, "mission.case=2")).mission, "ekf")
     assert shared.surroundings is flight.surroundings
-    for one, other in zip(shared.surroundings.block(0, 40)[:-1], alone.surroundings.block(0, 40)[:-1], strict=True):
-        np.testing.assert_array_equal(one, other)
+    for here, there in zip(shared.surroundings.block(0, 40)[:-1], alone.surroundings.block(0, 40)[:-1], strict=True):
+        np.testing.assert_array_equal(here, there)
 
 
 def test_the_worst_flight_is_the_one_that_its_file_flies(study):
