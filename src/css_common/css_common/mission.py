@@ -34,6 +34,7 @@ from css_common.parameter_sections import (
     given_to,
     is_for,
     is_shared,
+    merged_files,
     shared_by_all,
     with_own,
     with_shared,
@@ -295,6 +296,14 @@ class Mission:
         node, specification = self._find(key)
         canonical = self.shared if node is None else self.node(node).canonical
         return node, specification, canonical.get(specification.name)
+
+    def with_sections(self, sections: Sections) -> "Mission":
+        """The mission with the parameters of a file on top of its own, key by key.
+
+        Raises:
+            MissionError: a section or key that the mission does not have, or a value that is refused.
+        """
+        return self._with(merged_files([self.parameters, sections]))
 
     def with_node(self, node: tuple[str, str, str], changes: Mapping[str, str]) -> "Mission":
         """The mission with a node in its graph, there or not, and texts of parameters of its own applied.

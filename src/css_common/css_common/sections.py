@@ -41,7 +41,7 @@ DURATION = real(
     "simulated time to fly",
     low=0.0,
     open_low=True,
-    high=3.2e7,
+    high=3.2e8,
     example="mission: {duration: 5550.0}",
 )
 PERIOD = real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0)
@@ -233,7 +233,22 @@ FIELD_DIVIDER = integer(
     "magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000
 )
 
-MAGNETOMETER: Table = (FIELD_DIVIDER,)
+MEASURED_FIELD_BIAS = reals(
+    "magnetometer.measured.bias_nt", (), "nT", "bias of the magnetometer, as calibrated; empty: none", columns=3
+)
+MEASURED_FIELD_MATRIX = reals(
+    "magnetometer.measured.matrix",
+    (),
+    "-",
+    "what the magnetometer makes of a field besides its bias, as calibrated, row-major; empty: the field itself",
+    columns=3,
+)
+MEASURED_GYRO_BIAS = reals(
+    "gyro.measured.bias_deg_h", (), "deg/h", "bias of the gyro, as calibrated; empty: none", columns=3
+)
+
+MAGNETOMETER: Table = (FIELD_DIVIDER, MEASURED_FIELD_BIAS, MEASURED_FIELD_MATRIX)
+GYRO: Table = (MEASURED_GYRO_BIAS,)
 
 MEASURES: Table = (
     real(
@@ -404,6 +419,23 @@ def _rods_conflicts(rods: Values) -> Iterator[str]:
         yield f"rods.max_dipoles: {len(rods.max_dipoles)} given, expected one for each of {len(rods.axes)} rods"
 
 
+def _magnetometer_conflicts(magnetometer: Values) -> Iterator[str]:
+    measured = magnetometer.measured
+    if len(measured.bias_nt) not in (0, 1):
+        yield f"magnetometer.measured.bias_nt: {3 * len(measured.bias_nt)} numbers given, expected three or none"
+    if not len(measured.matrix):
+        return
+    if len(measured.matrix) != 3:
+        yield f"magnetometer.measured.matrix: {3 * len(measured.matrix)} numbers given, expected nine or none"
+    elif abs(np.linalg.det(measured.matrix)) < 1e-3:
+        yield "magnetometer.measured.matrix: singular, expected one near the identity"
+
+
+def _gyro_conflicts(gyro: Values) -> Iterator[str]:
+    if len(gyro.measured.bias_deg_h) not in (0, 1):
+        yield f"gyro.measured.bias_deg_h: {3 * len(gyro.measured.bias_deg_h)} numbers given, expected three or none"
+
+
 def _io_conflicts(io: Values) -> Iterator[str]:
     for key in ("body_frame", "inertial_frame"):
         if len(getattr(io, key).encode()) >= MAX_FRAME:
@@ -489,7 +521,8 @@ SECTIONS: dict[str, Section] = {
     "spacecraft": Section(SPACECRAFT, _spacecraft_conflicts),
     "wheels": Section(WHEELS, _wheels_conflicts),
     "rods": Section(RODS, _rods_conflicts),
-    "magnetometer": Section(MAGNETOMETER),
+    "magnetometer": Section(MAGNETOMETER, _magnetometer_conflicts),
+    "gyro": Section(GYRO, _gyro_conflicts),
     "measures": Section(MEASURES),
     "sampling": Section(SAMPLING),
     "graph": Section(GRAPH),

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A few cases of one configuration flown from start to end: the unit of work, of resuming and of distribution."""
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +12,7 @@ import pyarrow as pa
 
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
+from css_common.processors import usable_processors
 from css_monte_carlo.case_missions import drawn_columns
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import Tallies
@@ -137,7 +137,7 @@ def fly_in_threads(
         progress: told how many cases are done, and of how many.
     """
     numbers = [np.arange(first, min(first + _SHARE, cases)) for first in range(0, cases, _SHARE)]
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(usable_processors()) as pool:
         futures = [[pool.submit(fly_cases, flight, part, 1, guess_deg) for part in numbers] for flight in flights]
         done, total = 0, cases * len(flights)
         for of_flight in futures:

@@ -55,6 +55,50 @@ LARGEST_READING = real(
     "cells.largest_reading", 2.0, "-", "an output above it is no reading: the cell is missing", low=0.0
 )
 
+MEASURED_NORMALS = reals(
+    "cells.measured.normals",
+    (),
+    "-",
+    "normals as calibrated, for flight software; empty: those of the layout",
+    columns=3,
+)
+MEASURED_SCALES = reals(
+    "cells.measured.scales",
+    (),
+    "-",
+    "output of each cell at full light, as calibrated; empty: all 1",
+    low=0.01,
+    high=100.0,
+)
+MEASURED_DARKS = reals(
+    "cells.measured.darks",
+    (),
+    "-",
+    "output of each cell in the dark, as calibrated; empty: all 0",
+    low=-10.0,
+    high=10.0,
+)
+MEASURED_COEFFICIENTS = reals(
+    "cells.measured.temperature_coefficients",
+    (),
+    "1/K",
+    "relative change of each scale with temperature, as calibrated; empty: none known",
+    low=-1.0,
+    high=1.0,
+)
+MEASURED_TEMPERATURE = real(
+    "cells.measured.temperature", 20.0, "deg C", "temperature at which the scales hold", low=-273.15, high=1000.0
+)
+
+MEASURED: Table = (
+    MEASURED_NORMALS,
+    MEASURED_SCALES,
+    MEASURED_DARKS,
+    MEASURED_COEFFICIENTS,
+    MEASURED_TEMPERATURE,
+)
+"""What a calibration found of the cells."""
+
 CELLS: Table = (
     NORMALS,
     FIELD_OF_VIEW,
@@ -63,6 +107,7 @@ CELLS: Table = (
     BLOCKED,
     SMALLEST_READING,
     LARGEST_READING,
+    *MEASURED,
 )
 
 
@@ -77,9 +122,26 @@ def conflicts(cells: Values) -> Iterator[str]:
         yield f"cells.blocked: {len(cells.blocked)} given, expected {SIZE}, one for each direction of the grid"
     elif len(cells.blocked) and int(np.max(cells.blocked)) >> count:
         yield f"cells.blocked: has a cell beyond {count - 1}, expected sums of 2^0 to 2^{count - 1}"
+    yield from _measured_conflicts(cells)
     clip = np.linalg.norm(cells.clip_normal)
     if clip != 0.0 and abs(clip - 1.0) > 1e-6:
         yield f"cells.clip_normal: length {clip:.6g} given, expected a unit vector or zeros"
+
+
+def _measured_conflicts(cells: Values) -> Iterator[str]:
+    measured, count = cells.measured, len(cells.normals)
+    if len(measured.normals):
+        yield from unit_rows("cells.measured.normals", measured.normals, 1, MOST_CELLS)
+    for key in ("normals", "scales", "darks", "temperature_coefficients"):
+        given = len(getattr(measured, key))
+        if given and given != count:
+            yield f"cells.measured.{key}: {given} given, expected one for each of the {count} cells of cells.normals"
+
+
+def known_normals(values: Values) -> np.ndarray:
+    """(N, 3) normals as flight software knows them: calibrated ones if there are, else those of the layout."""
+    measured = values[MEASURED_NORMALS]
+    return np.asarray(measured if len(measured) else values[NORMALS], dtype=np.float64).reshape(-1, 3)
 
 
 def half_view_cosine(values: Values) -> float:

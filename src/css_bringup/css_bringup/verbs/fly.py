@@ -3,6 +3,7 @@
 
 import argparse
 import os
+from collections.abc import Mapping
 
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
@@ -15,6 +16,7 @@ from css_bringup.mission_asked_for import mission_of
 from css_bringup.options import complain, console, errors
 from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_bringup.stand_ins import stand_ins
 from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
@@ -26,6 +28,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.realtime is not None:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
+    components = stand_ins(mission, arguments.components)
+    for text in arguments.components:
+        console.print(f"in the place of a compiled function: {text}", soft_wrap=True)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
     nodes = [*(node.name for node in mission.nodes), RECORDER]
     enclaves = security.enclaves_of(nodes, arguments.processes)
@@ -33,13 +38,22 @@ def run(arguments: argparse.Namespace) -> int:
         security.enforced(os.environ, arguments.security, enclaves),
         own_domain(mission, arguments.domain, bag, console) as domain,
     ):
-        result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+        result = fly(
+            mission,
+            bag,
+            processes=arguments.processes,
+            console=console,
+            overwrite=arguments.overwrite,
+            stand_ins=components,
+        )
     result.domain = domain
     return conclude(mission, result, as_json=arguments.json)
 
 
-def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
-    """Prints a flight's result and turns it into an exit code."""
+def conclude(
+    mission: Mission, result: FlightResult, *, as_json: bool, further: Mapping[str, object] | None = None
+) -> int:
+    """Prints a flight's result and turns it into an exit code; `further` goes into its JSON object."""
     runs: list[Run] = []
     failed = NOTHING_FLOWN
     if result.bag is not None and result.steps > 0:
@@ -70,6 +84,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
             flight_object(result, runs)
             | {"faults": failed.faults, "detections": failed.objects()}
             | ({} if spinning is None else {"spin": spin_object(spinning)})
+            | dict(further or {})
         )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")

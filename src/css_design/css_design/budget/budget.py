@@ -11,6 +11,9 @@ from css_design.budget import measured, propagation
 from css_design.budget.measured import ALL, Errors, Estimate, Split
 from css_design.budget.propagation import Propagated
 from css_design.budget.sources import FILTER, LAYOUT, SOURCES, heard_sources, is_active
+from css_design.errors import DesignError
+from css_monte_carlo.mission_parts import is_heading, parts_of
+from css_sim.earth_reflectivity import clouds_move
 
 _ALIKE = 1.33  # ratio within which two are taken for the same
 _MATTERS = 0.02  # of the mean square: what is less is not worth a remark
@@ -66,8 +69,10 @@ def budget_of(
         tell_flown, tell_predicted: told how much is done, and of how much.
 
     Raises:
+        DesignError: the mission estimates no Sun.
         MissionError: the compiled loop has no place for something of the mission.
     """
+    _check(mission)
     flown = measured.fly(measured.configurations(mission), cases, tell_flown)
     predicted = propagation.propagate(mission, nominal, tell_predicted)
     active = [source for source in heard_sources(mission) if is_active(mission, source)]
@@ -83,6 +88,16 @@ def budget_of(
         parts,
         list(_remarks(mission, predicted, flown)),
     )
+
+
+def _check(mission: Mission) -> None:
+    name = mission.values.graph.estimator
+    node = next((node for node in mission.nodes if node.name == name), None)
+    if node is None or not is_heading(node):
+        what = "is not in the graph" if node is None else "estimates no Sun"
+        raise DesignError(
+            f"{mission.origin}: graph.estimator: {name} {what}, expected a Sun estimator, whose heading is split"
+        )
 
 
 def _part(
@@ -156,6 +171,9 @@ def _remarks(mission: Mission, predicted: Propagated, flown: dict[str, Errors]) 
         yield "scripted events fly in the Monte Carlo; the propagation goes by the parameters of the start"
     if mission.faults:
         yield "faults of the mission act in every configuration"
+    array = parts_of(mission).array.values
+    if array.albedo.enabled and clouds_move(array):
+        yield "clouds move in the flights; the propagation lets them stand as they are at the start"
     for node in mission.nodes:
         if getattr(node.values, "latency", 0.0) or getattr(node.values, "latency_spread", 0.0):
             yield f"latency of {node.name} counts as {FILTER}"

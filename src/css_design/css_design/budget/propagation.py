@@ -59,16 +59,23 @@ class Propagated(NamedTuple):
     runs: int  # of the estimator
 
 
-class _Along:
-    """One nominal flight, and what differences from it come to."""
+class Along:
+    """A mission without errors along a path, and what differences from it come to."""
 
-    def __init__(self, flight: MissionFlight, case: int, follower: Follower | None) -> None:
+    def __init__(self, flight: MissionFlight, path: Path, follower: Follower | None = None) -> None:
+        """Runs the estimator on perfect sensors.
+
+        Args:
+            flight: of the mission without errors.
+            path: that it flew.
+            follower: how its body follows; None: it is not said.
+        """
         self.flight = flight
-        self.path, self.said = flown_path(flight, case)
+        self.path = path
         self.nominal = readings(flight, self.path)
         self.base = estimates(flight, self.path, self.nominal)
         self._follower = follower
-        self.random = np.random.default_rng(_SEED + case)
+        self.random = np.random.default_rng(_SEED + path.case)
         self.runs = 1
 
     def run(self, measured: Measured) -> np.ndarray:
@@ -118,9 +125,9 @@ def propagate(mission: Mission, cases: int, tell: Tell) -> Propagated:
     for case in range(cases):
         tell(case, cases)
         around = flight.around_case(case) if flight.own_surroundings else flight
-        along = _Along(around, case, follower)
+        along = Along(around, flown_path(around, case)[0], follower)
         mask = along.path.counted & along.base.known
-        for name, square in _sources(mission, ideal, along):
+        for name, square in squares_by_source(mission, along):
             squares.setdefault(name, []).append(square[:, mask])
         counted += int(np.count_nonzero(mask))
         runs += along.runs
@@ -150,8 +157,8 @@ def rayleigh_percentile(squares: np.ndarray, share: float) -> float:
     return high
 
 
-def _sources(mission: Mission, ideal: Mission, along: _Along) -> Iterator[tuple[str, np.ndarray]]:
-    """Squares of each source that the mission has."""
+def squares_by_source(mission: Mission, along: Along) -> Iterator[tuple[str, np.ndarray]]:
+    """(2, M) mean squares [rad^2] of heading and pointing at each step, of each source that a mission has."""
     kinds = {
         "noise": _noise,
         "albedo": _given,
@@ -164,17 +171,17 @@ def _sources(mission: Mission, ideal: Mission, along: _Along) -> Iterator[tuple[
     for source in heard_sources(mission):
         if is_active(mission, source):
             node = mission.node(_name_of(mission, source.part))
-            yield source.name, kinds[source.name](mission, ideal, along, node.values)
-    yield from _perfect(ideal, along)
+            yield source.name, kinds[source.name](mission, along, node.values)
+    yield from _perfect(along)
 
 
 def _name_of(mission: Mission, part: str) -> str:
     return str(getattr(parts_of(mission), part).name)
 
 
-def _perfect(ideal: Mission, along: _Along) -> Iterator[tuple[str, np.ndarray]]:
+def _perfect(along: Along) -> Iterator[tuple[str, np.ndarray]]:
     """Layout and filter: what is left with perfect sensors."""
-    dense = seeing_everywhere(ideal)
+    dense = seeing_everywhere(along.flight.mission)
     truth = along.path.sun_b
     if dense is None:
         yield FILTER, along.apart(along.base.sun_b, truth, 1.0)
@@ -187,13 +194,13 @@ def _perfect(ideal: Mission, along: _Along) -> Iterator[tuple[str, np.ndarray]]:
     yield FILTER, along.apart(best, truth, 1.0)
 
 
-def _with_cells(along: _Along, voltages: np.ndarray, values: Values) -> Measured:
+def _with_cells(along: Along, voltages: np.ndarray, values: Values) -> Measured:
     """The nominal readings with other outputs of the cells, within the limits of their converter."""
     p = cell_parameters(values)
     return along.nominal._replace(voltages=np.clip(voltages, p.output_low, p.output_high))
 
 
-def _white(along: _Along, shape: tuple[int, ...], change: Callable[[np.ndarray], Measured]) -> np.ndarray:
+def _white(along: Along, shape: tuple[int, ...], change: Callable[[np.ndarray], Measured]) -> np.ndarray:
     """Mean over the probes of what is white, of which `change` is given one standard deviation."""
     total = np.zeros((2, len(along.path.truth)))
     for _ in range(PROBES):
@@ -202,12 +209,12 @@ def _white(along: _Along, shape: tuple[int, ...], change: Callable[[np.ndarray],
     return total / PROBES
 
 
-def _noise(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _noise(mission: Mission, along: Along, values: Values) -> np.ndarray:
     outputs, sigma = along.nominal.voltages, cell_parameters(values).noise
     return _white(along, outputs.shape, lambda signs: _with_cells(along, outputs + sigma * signs, values))
 
 
-def _quantisation(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _quantisation(mission: Mission, along: Along, values: Values) -> np.ndarray:
     """Rounding down: half a step of offset, and white errors of a step's width; then the threshold."""
     outputs, p = along.nominal.voltages, cell_parameters(values)
     total = np.zeros((2, len(outputs)))
@@ -221,7 +228,7 @@ def _quantisation(mission: Mission, ideal: Mission, along: _Along, values: Value
     return total
 
 
-def _given(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _given(mission: Mission, along: Along, values: Values) -> np.ndarray:
     """The light of the Earth of the flight's own case."""
     others = [source for source in SOURCES if source.name != "albedo" and source in heard_sources(mission)]
     return along.single(_readings_of(without(mission, others), along.path))
@@ -233,7 +240,7 @@ def _readings_of(mission: Mission, path: Path) -> Measured:
     return readings(flight, path)
 
 
-def _calibration(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _calibration(mission: Mission, along: Along, values: Values) -> np.ndarray:
     model, outputs = error_model(values), along.nominal.voltages
     scale = float(np.hypot(model.scale_cell_error, model.fixed_degradation / np.sqrt(_ROUNDED)))
     total = np.zeros((2, len(outputs)))
@@ -257,7 +264,7 @@ def _calibration(mission: Mission, ideal: Mission, along: _Along, values: Values
     return total + _response(mission, along, values)
 
 
-def _response(mission: Mission, along: _Along, values: Values) -> np.ndarray:
+def _response(mission: Mission, along: Along, values: Values) -> np.ndarray:
     """Response curve, losses and scale that all cells have, as they are drawn for the case."""
     lasting = ("scale_common_error", "scale_cell_error", "bias", "fixed_degradation")
     array = _name_of(mission, "array")
@@ -269,7 +276,7 @@ def _response(mission: Mission, along: _Along, values: Values) -> np.ndarray:
     return along.single(_readings_of(given, along.path))
 
 
-def _misalignment(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _misalignment(mission: Mission, along: Along, values: Values) -> np.ndarray:
     sigma, nominal = error_model(values).misalignment, along.nominal.voltages
     cells = cells_of_case(along.flight, along.path.case)
     total = np.zeros((2, len(nominal)))
@@ -293,7 +300,7 @@ def _misalignment(mission: Mission, ideal: Mission, along: _Along, values: Value
     return total
 
 
-def _gyro(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _gyro(mission: Mission, along: Along, values: Values) -> np.ndarray:
     p, rates = gyro_model.parameters(values), along.nominal.gyro_b
     count = len(rates)
     total = np.zeros((2, count))
@@ -313,7 +320,7 @@ def _gyro(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np
     return total
 
 
-def _magnetometer(mission: Mission, ideal: Mission, along: _Along, values: Values) -> np.ndarray:
+def _magnetometer(mission: Mission, along: Along, values: Values) -> np.ndarray:
     p, field = magnetometer_model.parameters(values), along.nominal.field_b
     total = np.zeros((2, len(field)))
     if not np.any(along.nominal.field_valid):

@@ -124,8 +124,6 @@ def _estimator(asked: Mapping[str, Any], has_wheels: bool) -> str:
     name = asked["estimator"]
     if name != "auto":
         return str(name)
-    if asked["gyro"] is not None:
-        return "ekf"
     return "sun_filter" if has_wheels else "wls"
 
 

@@ -113,7 +113,7 @@ ITEMS = (
     Item(
         "estimator",
         "",
-        "Sun estimator; auto: ekf with a gyro, sun_filter with wheels alone, wls with rods alone",
+        "Sun estimator; auto: sun_filter with wheels, wls with rods alone",
         "auto|ekf|sun_filter|wls|wavg",
         word("auto", "ekf", "sun_filter", "wls", "wavg"),
     ),

@@ -43,7 +43,7 @@ def _is_idle(item: Item, known: Mapping[str, str]) -> bool:
 
 def _answer(item: Item, default: str, read_line: Callable[[str], str], say: Callable[[str], None]) -> str:
     unit = f" [{item.unit}]" if item.unit else ""
-    say(f"{item.question}{unit}; for instance {item.form}")
+    say(f"{item.question}{unit}: {item.form}")
     while True:
         answer = read_line(f"  {item.name.replace('_', ' ')}{unit} ({default}): ").strip()
         if not answer:

@@ -11,7 +11,14 @@ from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
 from css_environment.albedo import Screen, is_blocked, plane_screen, view_cosine, with_views
 from css_estimation.symmetric import Symmetric, product
-from css_sensors.cells import IN_PLANE, blocked_directions, half_view_cosine, own_view_cosines, plane_sides
+from css_sensors.cells import (
+    IN_PLANE,
+    blocked_directions,
+    half_view_cosine,
+    known_normals,
+    own_view_cosines,
+    plane_sides,
+)
 
 READABLE = 2.0
 """From it on a number is no reading of a cell, 1 being the Sun at normal incidence.
@@ -35,7 +42,7 @@ class CellLayout(NamedTuple):
 
 def cell_layout(values: Values) -> CellLayout:
     """Layout of the mission's `cells` section."""
-    normals_b = np.asarray(values.cells.normals, dtype=np.float64)
+    normals_b = known_normals(values)
     cells = np.zeros(len(normals_b), CELL)
     cells["nx"], cells["ny"], cells["nz"] = normals_b.T
     cells["side"] = plane_sides(values)

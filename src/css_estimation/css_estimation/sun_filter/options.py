@@ -19,7 +19,16 @@ from css_estimation.sun.flight_sky import USE_FIELD
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
 from css_estimation.sun_filter import calibration_options
 from css_estimation.sun_filter.calibration_options import Calibration, lasting_error
-from css_sensors.cells import blocked_directions, half_view_cosine, own_view_cosines, plane_sides
+from css_sensors.cells import (
+    MEASURED_DARKS,
+    MEASURED_NORMALS,
+    MEASURED_SCALES,
+    blocked_directions,
+    half_view_cosine,
+    known_normals,
+    own_view_cosines,
+    plane_sides,
+)
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
 """One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
@@ -46,7 +55,7 @@ USE_WHEELS = flag("use_wheels", True, "without gyro, take the rate from angular 
 
 def _cells(values: Values) -> np.ndarray:
     """(N,) of CELL."""
-    nominal = np.asarray(values.cells.normals, dtype=np.float64).reshape(-1, 3)
+    nominal = known_normals(values)
     cells = np.zeros(len(nominal), CELL)
     measured = np.asarray(values[NORMALS], dtype=np.float64).reshape(-1, 3) if len(values[NORMALS]) else nominal
     cells["nx"], cells["ny"], cells["nz"] = (measured / np.linalg.norm(measured, axis=1, keepdims=True)).T
@@ -314,6 +323,9 @@ def conflicts(values: Values) -> Iterator[str]:
         yield f"{GAINS.name}: {np.min(values[GAINS]):g} given, expected gains above 0; a dead cell is left out as NaN"
     if len(values[NORMALS]) and np.any(np.linalg.norm(np.reshape(values[NORMALS], (-1, 3)), axis=1) < _NO_NORMAL):
         yield f"{NORMALS.name}: a row of zeros given, expected normals"
+    for parameter, measured in ((GAINS, MEASURED_SCALES), (DARKS, MEASURED_DARKS), (NORMALS, MEASURED_NORMALS)):
+        if len(values[parameter]) and len(values[measured]):
+            yield f"{parameter.name}: given together with {measured.name}, expected one of the two"
     if values[calibration_options.MODE] == "estimate" and not flight_sky.knows_place(values):
         yield (
             f"{calibration_options.MODE.name}: estimate given, but the place in orbit is not known, and the light of "
