@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Studies of several layouts beside each other, with 95 % intervals.
 
-    ./sunpoint layout okeefe_2013 --cells 8 --pointing 0.8 --out layouts
-    ./sunpoint monte-carlo okeefe_2013 --cases 200 --gyro on off --out studies/pyramid
-    ./sunpoint monte-carlo layouts/okeefe_2013_8_cells.yaml --cases 200 --gyro on off --out studies/found
-    ./sunpoint shell -c "python benchmarks/layout_figure.py studies/pyramid studies/found -o docs/images/layout.png"
+Of `./sunpoint layout okeefe_2013 --cells 8 --pointing 0.8 --out layouts` and two studies:
+./sunpoint shell -c "python benchmarks/layout_figure.py studies/pyramid studies/found -o docs/images/layout.png"
 """
 
 import argparse
