@@ -18,6 +18,7 @@ FLOORS = (
     {"css_environment", "css_recording", "css_sensors"},
     {"css_sim", "css_estimation", "sunpoint_control"},
     {"css_analysis"},
+    {"css_report"},
     {"css_bringup", "css_monte_carlo"},
     {"css_papers"},
 )

@@ -29,6 +29,7 @@ VERBS = {
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
     "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
+    "report": Verb("one page of a flight or a study, for any browser", "css_report", "report"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),

@@ -10,8 +10,7 @@ from typing import Any, NamedTuple
 
 from css_common.mission import Event
 from css_common.schema import ParameterError, Table
-
-PARAMETER_EVENTS = "/parameter_events"
+from css_recording.parameter_events import RecordedSetting
 
 
 class ParameterChange(NamedTuple):
@@ -23,31 +22,6 @@ class ParameterChange(NamedTuple):
     def text(self) -> str:
         """The values as KEY=VALUE."""
         return ", ".join(f"{key}={value}" for key, value in self.values.items())
-
-
-class RecordedSetting(NamedTuple):
-    """A message of /parameter_events."""
-
-    stamp_ns: int
-    node: str
-    values: Mapping[str, Any]
-
-
-def read_setting(data: bytes, stamp_ns: int) -> RecordedSetting:
-    """The parameters that a message of /parameter_events says have changed.
-
-    Args:
-        data: the serialised message.
-        stamp_ns: latest stamp of the flight when it was recorded.
-    """
-    # only recordings with such messages pay for rclpy
-    from rcl_interfaces.msg import ParameterEvent
-    from rclpy.parameter import parameter_value_to_python
-    from rclpy.serialization import deserialize_message
-
-    event = deserialize_message(data, ParameterEvent)
-    values = {p.name: parameter_value_to_python(p.value) for p in event.changed_parameters}
-    return RecordedSetting(stamp_ns, event.node.rsplit("/", 1)[-1], values)
 
 
 def settings_in_flight(

@@ -7,7 +7,7 @@ from typing import Any
 
 from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest
-from css_bringup.flight_changes import ParameterChange, RecordedSetting, settings_in_flight
+from css_bringup.flight_changes import ParameterChange, settings_in_flight
 from css_bringup.retracing import Given, Retrace
 from css_common.component import Cycles, Input, Output, Received
 from css_common.matching import Matcher

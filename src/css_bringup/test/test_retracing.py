@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from css_bringup.comparison import Comparison
-from css_bringup.flight_changes import ParameterChange, RecordedSetting, settings_in_flight
+from css_bringup.flight_changes import ParameterChange, settings_in_flight
 from css_bringup.retracing import Retrace
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Output

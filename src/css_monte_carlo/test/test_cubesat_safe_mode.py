@@ -16,7 +16,7 @@ from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.commands.monte_carlo import main
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.study import Study
-from css_monte_carlo.study_criteria import judge, refuse_unknown_criteria
+from css_analysis.study_criteria import judge, refuse_unknown_criteria
 
 NAME = "cubesat_3u_safe"
 CASES = np.arange(6)

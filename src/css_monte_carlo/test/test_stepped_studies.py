@@ -13,7 +13,7 @@ from css_monte_carlo.direct_flight import fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.stepped_flight import SteppedFlight
 from css_monte_carlo.study import Configuration, run_study
-from css_monte_carlo.study_summary import configuration_objects
+from css_analysis.study_summary import configuration_objects
 
 COARSE = ("mission.period=1.0", "mission.duration=330", "mrp_control.gains.p=0.5")
 SHORT = {

@@ -8,7 +8,7 @@ from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
-from css_bringup.faults_flown import NOTHING_FLOWN, faults_flown
+from css_analysis.faults_flown import NOTHING_FLOWN, faults_flown
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of

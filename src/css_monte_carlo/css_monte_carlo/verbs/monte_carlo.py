@@ -14,6 +14,8 @@ from rich.console import Console
 
 from css_analysis.quantities import Summary
 from css_analysis.readable_table import ReadableTable
+from css_analysis.study_criteria import judge, refuse_unknown_criteria
+from css_analysis.study_summary import summaries_of
 from css_common import places
 from css_common.mission import Mission, load_mission
 from css_monte_carlo.errors import StudyError
@@ -21,8 +23,7 @@ from css_monte_carlo.mission_parts import measured_estimators
 from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
-from css_monte_carlo.study_criteria import judge, refuse_unknown_criteria
-from css_monte_carlo.study_summary import study_object, summaries_of
+from css_monte_carlo.study_summary import study_object
 
 
 def run(options: argparse.Namespace) -> int:
