@@ -14,7 +14,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from css_analysis.palette import BLACK, BLUE, COLOURS, DARK_GREY, GREEN, GREY, ORANGE, PURPLE, SHADE, SKY, VERMILION
+from css_analysis.palette import COLOURS, DARK_GREY, GREY, SHADE
 
 _DPI = 150
 _STYLE: dict[Any, Any] = {

@@ -17,10 +17,10 @@ from css_common.component import Input
 from css_common.edge import Edge
 from css_common.mission import Mission, mission_from_text
 from css_common.mission_file import MissionError
-from css_recording.parameter_events import PARAMETER_EVENTS, RecordedSetting, read_setting
 from css_recording.bag_metadata import Topic, absolute
 from css_recording.bag_reader import BagMessage, BagReader
 from css_recording.bag_writer import BagWriter
+from css_recording.parameter_events import PARAMETER_EVENTS, RecordedSetting, read_setting
 
 __all__ = ["EstimatorRequest", "Replay", "parse_request"]
 

@@ -17,6 +17,7 @@ from css_common.schema import shaped_values
 from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_recording.bag_metadata import absolute
+from css_recording.parameter_events import RecordedSetting
 
 ESTIMATORS = "css_estimation"
 

@@ -15,6 +15,7 @@ from css_common.mission import Event
 from css_common.schema import checked_values, real
 from css_common.stepping import Stepper
 from css_msgs.msg import SunEstimate
+from css_recording.parameter_events import RecordedSetting
 
 STEP = 100_000_000
 CODEC = codec_of(SunEstimate)

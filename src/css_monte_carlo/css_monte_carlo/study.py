@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.configured_mission import configured, is_attitude_filter
 from css_analysis.flight_metrics import Windows, windows_of
 from css_analysis.study_record import StudyRecord, read_record
 from css_common.kernel import study_hash
@@ -18,7 +19,7 @@ from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
 from css_monte_carlo.attitude_guess import takes_guess
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.direct_flight import configured, is_attitude_filter, refuse_what_needs_the_graph
+from css_monte_carlo.direct_flight import refuse_what_needs_the_graph
 from css_monte_carlo.drawn_faults import COLUMN, has_faults
 from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
 from css_monte_carlo.mission_parts import NoPlace, parts_of

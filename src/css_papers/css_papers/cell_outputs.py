@@ -46,7 +46,12 @@ class OrbitOutputs(NamedTuple):
 
 def response(mission: Mission) -> Response:
     """Response of one free cell of the mission, the Sun at 1 AU."""
-    one_cell = ("cells.normals=0,0,1", "cells.clip_normal=0,0,0", _NO_ALBEDO, *(f"{ARRAY}.{error}" for error in NO_ERRORS))
+    one_cell = (
+        "cells.normals=0,0,1",
+        "cells.clip_normal=0,0,0",
+        _NO_ALBEDO,
+        *(f"{ARRAY}.{error}" for error in NO_ERRORS),
+    )
     upright = np.zeros(3)
     place = MissionEnvironment(mission.values, field=False).at(0.0)._replace(solar_flux=1.0, illumination=1.0)
     angle = np.radians(_ANGLES_DEG)

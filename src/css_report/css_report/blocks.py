@@ -57,6 +57,7 @@ class Plot:
         legend: further entries: label and what the sample shows.
         caption: what is to be known to read it.
         height: [px].
+        narrow: stands beside others where the page is wide enough.
     """
 
     key: str
@@ -71,6 +72,7 @@ class Plot:
     legend: Sequence[tuple[str, Mapping[str, Any]]] = ()
     caption: str = ""
     height: int = 260
+    narrow: bool = False
 
 
 class Beside(NamedTuple):

@@ -101,8 +101,9 @@ def _coverage_trace(coverage: np.ndarray) -> Trace:
     most = max(int(coverage.max()), 1)
     # grey from dark to light: it says the same without colour
     return {
-        "type": "heatmap", "x": azimuth, "y": polar, "z": coverage, "zmin": 0, "zmax": most, "showscale": False,
-        "colorscale": [[0.0, "#5a5f66"], [1.0, "#f2f4f6"]], "hovertemplate": "%{z} cells<extra></extra>", "zsmooth": False,
+        "type": "heatmap", "x": azimuth, "y": polar, "z": coverage, "zmin": 0, "zmax": most,
+        "showscale": False, "colorscale": [[0.0, "#5a5f66"], [1.0, "#f2f4f6"]], "zsmooth": False,
+        "hovertemplate": "%{z} cells<extra></extra>",
     }  # fmt: skip
 
 
@@ -112,7 +113,9 @@ def _views(values: Values, axes: np.ndarray) -> Iterator[Trace]:
     hidden_by, sides = screen(values), cell_sides(values)
     for i, normal in enumerate(values.cells.normals):
         own = axes_about(normal)
-        edge = np.column_stack((np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn), np.full(len(turn), np.cos(half))))
+        edge = np.column_stack(
+            (np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn), np.full(len(turn), np.cos(half)))
+        )
         edge_b = edge @ own
         seen = np.array([transmission(hidden_by, float(sides[i]), tuple(e.tolist())) > 0.0 for e in edge_b])
         at = map_coordinates(axes, edge_b)
@@ -178,8 +181,8 @@ def _broken(at: np.ndarray, more: Trace) -> Trace:
     jumps = np.flatnonzero(np.abs(np.diff(at[:, 0])) > 180.0) + 1
     at = np.insert(at, jumps, np.nan, axis=0)
     return {
-        "type": "scatter", "mode": "lines", "x": np.asarray(at[:, 0], np.float32), "y": np.asarray(at[:, 1], np.float32),
-        "hoverinfo": "name", **more,
+        "type": "scatter", "mode": "lines", "x": np.asarray(at[:, 0], np.float32),
+        "y": np.asarray(at[:, 1], np.float32), "hoverinfo": "name", **more,
     }  # fmt: skip
 
 

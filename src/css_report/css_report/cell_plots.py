@@ -47,7 +47,9 @@ def _masks(scene: Scene) -> Plot | None:
     ordinates = range(count)
     traces = [
         bars(f"used by {name}", _bits(time, columns.lit_mask, ordinates, 0.0), look(0)._replace(marker=""), 7.0, gap),
-        bars("left out for failed", _bits(time, columns.isolated, ordinates, 0.22), Look("#D55E00", marker="x"), 3.0, gap),
+        bars(
+            "left out for failed", _bits(time, columns.isolated, ordinates, 0.22), Look("#D55E00", marker="x"), 3.0, gap
+        ),
     ]
     if log.voltages is not None:
         limit = _bits(scene.time(log.voltages), log.voltages.saturated, ordinates, -0.22)
@@ -74,7 +76,9 @@ def _cells(log: FlightLog, name: str) -> int:
     return max(ever.bit_length(), 1)
 
 
-def _bits(time: np.ndarray, masks: np.ndarray, units: range, above: float) -> dict[float, tuple[np.ndarray, np.ndarray]]:
+def _bits(
+    time: np.ndarray, masks: np.ndarray, units: range, above: float
+) -> dict[float, tuple[np.ndarray, np.ndarray]]:
     """Spans in which a bit is set, by the ordinate of its unit."""
     spans = {unit - above: spans_of(time, (masks >> np.uint32(unit) & 1) != 0) for unit in units}
     return {at: found for at, found in spans.items() if len(found[0])}
@@ -111,5 +115,3 @@ def _ends(scene: Scene, found: list[Spell]) -> tuple[np.ndarray, np.ndarray]:
     begin = np.array([spell.begin_s / scale for spell in found])
     end = np.array([last if spell.end_s is None else spell.end_s / scale for spell in found])
     return begin, np.maximum(end, begin)
-
-

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Two flights or studies beside each other."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from css_analysis.estimator_runs import Run
@@ -17,12 +17,10 @@ def beside(names: tuple[str, str], first: Sequence[Section], second: Sequence[Se
     titles = dict.fromkeys(section.title for section in (*first, *second))
     ours = {section.title: section.blocks for section in first}
     theirs = {section.title: section.blocks for section in second}
-    return [
-        Section(title, list(_paired(names, ours.get(title, ()), theirs.get(title, ())))) for title in titles
-    ]
+    return [Section(title, list(_paired(names, ours.get(title, ()), theirs.get(title, ())))) for title in titles]
 
 
-def _paired(names: tuple[str, str], ours: Sequence[Block], theirs: Sequence[Block]):
+def _paired(names: tuple[str, str], ours: Sequence[Block], theirs: Sequence[Block]) -> Iterator[Block]:
     """Plots by their keys, in pairs; what is no plot before them, as a pair of columns."""
     texts = tuple([block for block in side if not isinstance(block, Plot)] for side in (ours, theirs))
     plots = tuple({block.key: block for block in side if isinstance(block, Plot)} for side in (ours, theirs))

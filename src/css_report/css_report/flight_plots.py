@@ -278,7 +278,9 @@ def _modes(scene: Scene) -> Plot | None:
         modes, time = log.control.mode, scene.time(log.control)
         turns = np.flatnonzero(np.diff(modes)) + 1
         corners = np.unique(np.concatenate(([0], turns, [len(modes) - 1])))
-        reasons = [f"{MODES.get(int(modes[i]), modes[i])}: {REASONS.get(int(log.control.reason[i]), '')}" for i in turns]
+        reasons = [
+            f"{MODES.get(int(modes[i]), modes[i])}: {REASONS.get(int(log.control.reason[i]), '')}" for i in turns
+        ]
         traces.append(line("mode", time[corners], modes[corners], look(0), steps=True, bins=len(modes)))
         if len(turns):
             traces.append(dots("change", time[turns].tolist(), modes[turns].tolist(), look(0), reasons, 6))

@@ -17,6 +17,7 @@ from css_report.embedded import embedded_json
 from css_report.swatches import swatch_of, swatch_of_trace
 
 _MANY = 3  # columns from which a table becomes blocks of lines on a phone
+_LONG = 28  # letters from which a text in a table may be broken anywhere
 
 
 def html_of(page: Page, folder: Path | None = None) -> str:
@@ -140,7 +141,7 @@ class _Writer:
 
 
 def _is_small_plot(block: Block) -> bool:
-    return isinstance(block, Plot) and not block.linked
+    return isinstance(block, Plot) and block.narrow
 
 
 def _command(line: tuple[str, str]) -> str:
@@ -170,7 +171,7 @@ def _legend(plot: Plot) -> str:
 
 def _table(table: Table) -> str:
     e = html.escape
-    many = ' class="many"' if len(table.heading) > _MANY else ""
+    many = ' class="many"' if len(table.heading) >= _MANY else ""
     head = "".join(f"<th>{e(text)}</th>" for text in table.heading)
     lines = ("".join(map(_cell, table.heading, line)) for line in table.lines)
     body = "\n".join(f"<tr>{line}</tr>" for line in lines)
@@ -178,5 +179,5 @@ def _table(table: Table) -> str:
 
 
 def _cell(heading: str, text: str) -> str:
-    kind = ' class="misses"' if text.endswith(MISSES) else ""
+    kind = ' class="misses"' if text.endswith(MISSES) else ' class="long"' if len(text) >= _LONG else ""
     return f'<td{kind} data-of="{html.escape(heading)}">{html.escape(text)}</td>'

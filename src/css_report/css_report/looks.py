@@ -30,6 +30,4 @@ LEVEL = Look(GREY, "dash")
 
 def look(number: int) -> Look:
     """The look of the line of a number; 210 of them differ."""
-    return Look(
-        _COLOURS[number % len(_COLOURS)], _DASHES[number % len(_DASHES)], _MARKERS[number % len(_MARKERS)]
-    )
+    return Look(_COLOURS[number % len(_COLOURS)], _DASHES[number % len(_DASHES)], _MARKERS[number % len(_MARKERS)])

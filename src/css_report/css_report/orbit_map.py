@@ -57,7 +57,7 @@ def _simulated_cells(log: FlightLog) -> Node | None:
 
 
 def places(log: FlightLog, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(K, 2) longitude and geocentric latitude [deg] below the spacecraft, and below the Sun, at rows (K,) of the truth."""
+    """(K, 2) longitude and latitude [deg] below the spacecraft, and below the Sun, at rows (K,) of the truth."""
     truth = log.having("truth")
     below, under_sun = np.empty((len(rows), 2)), np.empty((len(rows), 2))
     for k, row in enumerate(rows.tolist()):

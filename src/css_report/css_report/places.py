@@ -21,4 +21,6 @@ def page_of(subject: Path, against: Path | None = None) -> Path:
             return subject / STUDY_PAGE
         return subject.with_name(f"{name}.html") if subject.name else Path(f"{name}.html")
     other = Path(against)
-    return subject.absolute().with_name(f"{name}_against_{other.stem if other.is_file() else other.absolute().name}.html")
+    return subject.absolute().with_name(
+        f"{name}_against_{other.stem if other.is_file() else other.absolute().name}.html"
+    )

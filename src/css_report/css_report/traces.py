@@ -35,12 +35,15 @@ def line(
     return trace
 
 
-def dots(name: str, x: Sequence[float], y: Sequence[Any], look: Look, texts: Sequence[str] = (), size: int = 9) -> Trace:
+def dots(
+    name: str, x: Sequence[float], y: Sequence[Any], look: Look, texts: Sequence[str] = (), size: int = 9
+) -> Trace:
     """Points, each with a text of its own where there are some."""
     trace: Trace = {
         "type": "scatter",
         "name": name,
         "mode": "markers",
+        "cliponaxis": False,
         "x": list(x),
         "y": list(y),
         "marker": {"symbol": look.marker or "circle", "size": size, "color": look.colour},
@@ -56,8 +59,7 @@ def band(name: str, x: np.ndarray, low: np.ndarray, high: np.ndarray, look: Look
     common: Trace = {"type": "scatter", "mode": "lines", "line": edge, "x": np.asarray(x, np.float64)}
     return [
         common | {"name": name, "y": np.asarray(low, np.float32), "meta": {"part": True}, "hoverinfo": "skip"},
-        common
-        | {"name": name, "y": np.asarray(high, np.float32), "fill": "tonexty", "fillcolor": look.colour + alpha},
+        common | {"name": name, "y": np.asarray(high, np.float32), "fill": "tonexty", "fillcolor": look.colour + alpha},
     ]
 
 

@@ -5,10 +5,11 @@ import argparse
 import os
 
 from css_analysis.estimator_runs import Run, estimator_runs
+from css_analysis.faults_flown import NOTHING_FLOWN, faults_flown
 from css_analysis.flight_log import read_flight
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
-from css_analysis.faults_flown import NOTHING_FLOWN, faults_flown
+from css_bringup.flight_pages import write_flight_page
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
@@ -35,13 +36,13 @@ def run(arguments: argparse.Namespace) -> int:
     ):
         result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
     result.domain = domain
-    return conclude(mission, result, as_json=arguments.json)
+    return conclude(mission, result, as_json=arguments.json, with_page=arguments.report)
 
 
-def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
-    """Prints a flight's result and turns it into an exit code."""
+def conclude(mission: Mission, result: FlightResult, *, as_json: bool, with_page: bool = False) -> int:
+    """Prints a flight's result, writes its page and turns it into an exit code."""
     runs: list[Run] = []
-    failed = NOTHING_FLOWN
+    failed, log = NOTHING_FLOWN, None
     if result.bag is not None and result.steps > 0:
         try:
             log = read_flight(result.bag)
@@ -64,14 +65,16 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
     missed = unmet(result, runs) if flown and result.bag is not None else []
     for line in missed:
         complain("criterion missed:", line)
+    page = None if log is None or not with_page else write_flight_page(log, runs, failed, result)
     print_incidents(result)
     if as_json:
         print_json(
             flight_object(result, runs)
-            | {"faults": failed.faults, "detections": failed.objects()}
+            | {"faults": failed.faults, "detections": failed.objects(), "page": None if page is None else str(page)}
             | ({} if spinning is None else {"spin": spin_object(spinning)})
         )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED
-    return FAILED if result.failure or result.notes or missed else 0
+    unwritten = with_page and log is not None and page is None
+    return FAILED if result.failure or result.notes or missed or unwritten else 0

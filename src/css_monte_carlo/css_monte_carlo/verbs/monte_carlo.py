@@ -17,6 +17,7 @@ from css_analysis.readable_table import ReadableTable
 from css_analysis.study_criteria import judge, refuse_unknown_criteria
 from css_analysis.study_summary import summaries_of
 from css_common import places
+from css_common.command import FAILED
 from css_common.mission import Mission, load_mission
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.mission_parts import measured_estimators
@@ -24,6 +25,9 @@ from css_monte_carlo.progress import progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, Study, run_study
 from css_monte_carlo.study_summary import study_object
+from css_report.after_run import write_page_after
+from css_report.places import page_of
+from css_report.study_page import study_page
 
 
 def run(options: argparse.Namespace) -> int:
@@ -64,9 +68,14 @@ def run(options: argparse.Namespace) -> int:
         print(line)
     if judged:
         result["criteria"] = [configuration.as_object() for configuration in judged]
+    page = None
+    if options.report:
+        page = write_page_after("monte-carlo", lambda: study_page(study), page_of(study.folder))
+    result["page"] = None if page is None else str(page)
     if options.json:
         print(json.dumps(result, allow_nan=False))
-    return 0 if all(configuration.passed for configuration in judged) else 1
+    unwritten = options.report and page is None
+    return FAILED if unwritten or not all(configuration.passed for configuration in judged) else 0
 
 
 def _refuse_bad_numbers(options: argparse.Namespace) -> None:

@@ -19,7 +19,9 @@ def run(options: argparse.Namespace) -> int:
     """Writes the page that the options ask for; the exit code."""
     subject, against = options.subject, options.against
     if against is not None and is_study(against) != is_study(subject):
-        raise ReportError(f"--against {against}: expected a {'study' if is_study(subject) else 'recording'}, as {subject} is")
+        raise ReportError(
+            f"--against {against}: expected a {'study' if is_study(subject) else 'recording'}, as {subject} is"
+        )
     file = options.output or page_of(subject, against)
     if file.is_dir():
         raise ReportError(f"{file}: is a folder, expected a file to write")
