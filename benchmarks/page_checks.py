@@ -13,13 +13,15 @@ WIDTHS = (1400, 800, 390)
 
 _ALL_DRAWN = """(async () => {
   const pause = (ms) => new Promise((done) => setTimeout(done, ms));
+  const drawn = ".main-svg .cartesianlayer .subplot";
   for (const figure of document.querySelectorAll("figure.plot")) {
     figure.scrollIntoView();
-    for (let i = 0; i < 600 && !figure.querySelector(".main-svg .cartesianlayer .subplot"); i++) await pause(50);
+    for (let i = 0; i < 600 && !figure.querySelector(drawn); i++) await pause(50);
   }
   scrollTo(0, 0);
   await pause(100);
-  return [...document.querySelectorAll("figure.plot")].filter((f) => !f.querySelector(".main-svg .cartesianlayer .subplot")).map((f) => f.id);
+  const missing = [...document.querySelectorAll("figure.plot")].filter((f) => !f.querySelector(drawn));
+  return missing.map((f) => f.id);
 })()"""
 
 _FIRST_DRAWN = """(async () => {
@@ -146,7 +148,7 @@ def linked_zoom(path: str, page: Path) -> tuple[list[float], list[float]]:
         browser.open(page)
         browser.evaluate(_ALL_DRAWN)
         ids = browser.evaluate(
-            "[...document.querySelectorAll('figure.plot[data-linked]')].filter((f) => f.dataset.linked).map((f) => f.id)"
+            "[...document.querySelectorAll('figure.plot')].filter((f) => f.dataset.linked).map((f) => f.id)"
         )
         if len(ids) < 2:
             raise BrowserError(f"{page}: no two plots are linked")

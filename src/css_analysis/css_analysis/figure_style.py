@@ -14,7 +14,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from css_analysis.palette import COLOURS, DARK_GREY, GREY, SHADE
+from css_analysis import palette
+
+BLUE, ORANGE, GREEN, VERMILION = palette.BLUE, palette.ORANGE, palette.GREEN, palette.VERMILION
+PURPLE, SKY, BLACK, GREY = palette.PURPLE, palette.SKY, palette.BLACK, palette.GREY
+COLOURS, SHADE, DARK_GREY = palette.COLOURS, palette.SHADE, palette.DARK_GREY
 
 _DPI = 150
 _STYLE: dict[Any, Any] = {

@@ -57,7 +57,8 @@ def merits_beside(
             values = [side[label].get(quantity.name) if label in side else None for side in sides]
             if values == [None, None]:
                 continue
-            difference = NONE if None in values else value_text(quantity, values[1] - values[0])
+            first, second = values
+            difference = NONE if first is None or second is None else value_text(quantity, second - first)
             lines.append(
                 [f"{label}: {quantity.name}", quantity.unit, *(value_text(quantity, v) for v in values), difference]
             )

@@ -98,7 +98,7 @@ def _lead(flight: Flight) -> str:
 
 def _sections(flight: Flight, linked: str) -> list[Section]:
     scene = scene_of(flight.log, linked)
-    parts = {
+    parts: dict[str, list[Block]] = {
         _SUMMARY: _summary(flight),
         _TIME: [*flight_plots(scene), *cell_plots(scene)],
         _BODY: list(body_blocks(flight.log)),
@@ -117,7 +117,8 @@ def _orbit(scene: Scene) -> list[Block]:
 
 
 def _summary(flight: Flight) -> list[Block]:
-    log, blocks = flight.log, []
+    log = flight.log
+    blocks: list[Block] = []
     if flight.runs:
         blocks.append(merit_table(log, flight.runs))
     else:

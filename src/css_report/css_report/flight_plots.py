@@ -208,7 +208,9 @@ def _rate_norm(scene: Scene) -> Plot | None:
     if log.truth is not None and (not log.imported or np.any(log.rate > 0.0)):
         traces.append(line("true", scene.time(log.truth), np.degrees(log.rate), TRUE))
     for i, (name, columns) in enumerate((log.estimates | log.attitudes).items()):
-        traces.append(line(f"by {name}", scene.time(columns), _rates(columns)[:, 3], look(i)))
+        rates = _rates(columns)[:, 3]
+        if np.isfinite(rates).any():
+            traces.append(line(f"by {name}", scene.time(columns), rates, look(i)))
     if not traces:
         return None
     return scene.plot("rate", "Body rate", "rate [deg/s]", traces, y={"rangemode": "tozero"})
@@ -234,7 +236,8 @@ def _rate_axes(scene: Scene) -> Plot | None:
             traces.append(line(f"{axis}: true", scene.time(log.truth), true, look(i)))
         if name is not None:
             rates = _rates(estimates[name])[:, i]
-            traces.append(line(f"{axis}: by {name}", scene.time(estimates[name]), rates, look(i).dashed("dot")))
+            if np.isfinite(rates).any():
+                traces.append(line(f"{axis}: by {name}", scene.time(estimates[name]), rates, look(i).dashed("dot")))
     return scene.plot("rate-axes", "Body rate by axis", "rate [deg/s]", traces) if traces else None
 
 

@@ -146,16 +146,22 @@ def _bars(label: str, values: np.ndarray, edges: np.ndarray, number: int, count:
     counts, _ = np.histogram(values[np.isfinite(values)], edges)
     share = 100.0 * counts / max(cases, 1)
     ends = [share_interval(int(n), cases) for n in counts]
-    more = [100.0 * (high or 0.0) - s for (_, high), s in zip(ends, share, strict=True)]
+    # an empty field has an upper end too, but twenty of them would hide the others
+    more = [100.0 * (high or 0.0) - s if s > 0.0 else None for (_, high), s in zip(ends, share, strict=True)]
     less = [s - 100.0 * (low or 0.0) for (low, _), s in zip(ends, share, strict=True)]
     of, width = look(number), edges[1:] - edges[:-1]
+    pattern = {
+        "shape": _PATTERNS[number % len(_PATTERNS)],
+        "solidity": 0.3,
+        "fillmode": "overlay",
+        "fgcolor": "#ffffff",
+    }
     return {
         "type": "bar", "name": label, "x": (0.5 * (edges[1:] + edges[:-1])), "y": share,
         "width": 0.9 * width / count, "offset": width * (number / count - 0.475),
-        "marker": {"color": of.colour, "pattern": {"shape": _PATTERNS[number % len(_PATTERNS)], "solidity": 0.3}},
+        "marker": {"color": of.colour, "pattern": pattern},
         "error_y": {
             "type": "data", "symmetric": False, "array": more, "arrayminus": less, "thickness": 1, "width": 2,
             "color": "#5A5A5A",
         },
-        "meta": {"pattern": _PATTERNS[number % len(_PATTERNS)]},
     }  # fmt: skip

@@ -14,8 +14,16 @@ _MARKERS = {
     "cross": '<path d="M15.5 2.5h3v3h3v3h-3v3h-3v-3h-3v-3h3z"/>',
     "x": '<path d="M13.5 3.5l7 7m0-7l-7 7" stroke-width="2.4"/>',
     "star": '<path d="M17 2l1.4 3.4 3.6.3-2.7 2.4.8 3.6-3.1-1.9-3.1 1.9.8-3.6-2.7-2.4 3.6-.3z"/>',
-    "line-ns": '<path d="M17 2v10" stroke-width="2"/>',
+    "/": '<path d="M6 12l5-10m5 10l5-10m5 10l5-10"/>',
+    "\\": '<path d="M6 2l5 10m5-10l5 10m5-10l5 10"/>',
+    "|": '<path d="M9 2v10m8-10v10m8-10v10"/>',
+    "-": '<path d="M2 5h30m-30 4h30"/>',
+    "+": '<path d="M2 7h30m-23-5v10m8-10v10m8-10v10"/>',
+    "crosses": '<path d="M5 3l8 8m0-8l-8 8m8-8l8 8m0-8l-8 8m8-8l8 8m0-8l-8 8"/>',
+    "dots": '<path d="M6 7h0.1m7 0h0.1m7 0h0.1m7 0h0.1" stroke-width="3" stroke-linecap="round"/>',
 }
+_PATTERNS = {"/": "/", "\\": "\\", "|": "|", "-": "-", "+": "+", "x": "crosses", ".": "dots"}
+"""Plotly's patterns of bars, and their sample."""
 
 
 def swatch_of_trace(trace: Mapping[str, Any]) -> str:
@@ -25,7 +33,8 @@ def swatch_of_trace(trace: Mapping[str, Any]) -> str:
     symbol = marker.get("symbol", "circle") if "markers" in mode else ""
     colour = line.get("color") if "lines" in mode else marker.get("color")
     if trace.get("type") == "bar":
-        return swatch_of("area", str(marker.get("color", "#8C8C8C")), str(marker.get("color", "#8C8C8C")))
+        colour = str(marker.get("color", "#8C8C8C"))
+        return swatch_of("area", colour, colour, marker=_PATTERNS.get(marker.get("pattern", {}).get("shape", ""), ""))
     swatch = "area" if trace.get("fill") else "line" if "lines" in mode else "marker"
     return swatch_of(
         swatch,

@@ -54,7 +54,11 @@ def dots(
 
 
 def band(name: str, x: np.ndarray, low: np.ndarray, high: np.ndarray, look: Look, alpha: str = "38") -> list[Trace]:
-    """The area between two lines; its borders are drawn so that it is seen without colour."""
+    """The area between two lines, where both have a number; its borders are drawn: it is seen without colour."""
+    known = np.isfinite(low) & np.isfinite(high)
+    x, low, high = (np.asarray(values)[known] for values in (x, low, high))
+    rows = np.union1d(kept_rows(low), kept_rows(high))
+    x, low, high = x[rows], low[rows], high[rows]
     edge = {"color": look.colour, "dash": look.dash, "width": 0.7}
     common: Trace = {"type": "scatter", "mode": "lines", "line": edge, "x": np.asarray(x, np.float64)}
     return [
