@@ -16,7 +16,7 @@ from css_report.traces import Trace, dots
 from css_sensors.cells import half_view_cosine
 from css_sim.cell_screen import cell_sides, screen
 
-_STEP_DEG = 2.0  # of the map of coverage
+_STEP_DEG = 1.0  # of the map of coverage
 _LEAST_WAY = np.radians(0.5)  # between points of a path that are drawn
 _MOST_POINTS = 6000  # of a path; a longer one is drawn with wider steps
 _X = {"range": [0.0, 360.0], "tickvals": [0, 60, 120, 180, 240, 300, 360], "constrain": "domain"}
