@@ -148,6 +148,22 @@ class Browser:
         asked = [e["params"]["request"]["url"] for e in self.events if e.get("method") == "Network.requestWillBeSent"]
         return [url for url in asked[1:] if not url.startswith(("data:", "blob:"))]
 
+    def cpu_s(self) -> float:
+        """Processor time [s] of the browser and all of its processes so far."""
+        parents: dict[int, int] = {}
+        ticks: dict[int, int] = {}
+        for stat in Path("/proc").glob("[0-9]*/stat"):
+            try:
+                fields = stat.read_text().rpartition(")")[2].split()
+            except OSError:
+                continue  # it has just ended
+            parents[int(stat.parent.name)] = int(fields[1])
+            ticks[int(stat.parent.name)] = int(fields[11]) + int(fields[12])
+        own = {self._process.pid}
+        while new := {pid for pid, parent in parents.items() if parent in own} - own:
+            own |= new
+        return sum(ticks.get(pid, 0) for pid in own) / os.sysconf("SC_CLK_TCK")
+
     def screenshot(self, file: Path, *, whole: bool = False) -> None:
         """What is in view as PNG, or the whole page."""
         shot = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=whole)

@@ -98,7 +98,7 @@ class Seen(NamedTuple):
     width: int
     loaded_ms: float  # from the start of navigation to the event `load`
     drawn_ms: float  # to the first plots in view, the last before `load` or after it
-    cpu_s: float  # processor time of the page's process up to there
+    cpu_s: float  # processor time of all processes of the browser for it
     plots: int
     faults: list[str]
 
@@ -120,14 +120,14 @@ def look_at(path: str, page: Path, width: int, shots: Path | None = None, *, dar
         if dark:
             features = [{"name": "prefers-color-scheme", "value": "dark"}]
             browser.call("Emulation.setEmulatedMedia", features=features)
-        browser.call("Performance.enable")
+        before_s = browser.cpu_s()
         browser.open(page)
         drawn_ms = float(browser.evaluate(_FIRST_DRAWN))
         loaded_ms = float(
             browser.evaluate("(([entry]) => entry.loadEventEnd || performance.now())"
                              "(performance.getEntriesByType('navigation'))")
         )  # fmt: skip
-        metrics = {m["name"]: m["value"] for m in browser.call("Performance.getMetrics")["metrics"]}
+        cpu_s = browser.cpu_s() - before_s
         faults = [f"plot {name} is not drawn" for name in browser.evaluate(_ALL_DRAWN)]
         faults += browser.evaluate(_FAULTS)
         faults += [f"console: {line}" for line in browser.complaints]
@@ -135,7 +135,7 @@ def look_at(path: str, page: Path, width: int, shots: Path | None = None, *, dar
         plots = int(browser.evaluate("document.querySelectorAll('figure.plot').length"))
         if shots is not None:
             browser.screenshot(shots / f"{page.stem}_{width}{'_dark' if dark else ''}.png", whole=True)
-        return Seen(width, loaded_ms, max(drawn_ms, loaded_ms), metrics["TaskDuration"], plots, faults)
+        return Seen(width, loaded_ms, max(drawn_ms, loaded_ms), cpu_s, plots, faults)
 
 
 def linked_zoom(path: str, page: Path) -> tuple[list[float], list[float]]:

@@ -18,9 +18,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Rectangle
 from matplotlib.text import Annotation
 
-from css_analysis.palette import SHADE
+from css_analysis.palette import BLACK, SHADE
 from css_report.blocks import Plot
-from css_report.drawn_lines import axis_of, dash_of, has_line, heatmap, marker_of, with_opacity
+from css_report.drawn_lines import axis_of, dash_of, has_line, heatmap, is_dashed, marker_of, with_opacity
 from css_report.looks import Look
 from css_report.traces import ECLIPSE_ENTRY, Trace, line
 
@@ -60,6 +60,13 @@ def _legend_names(shown: list[Axes]) -> dict[tuple[str, str], str]:
             if not label.startswith("_"):
                 names.setdefault((to_hex(drawn.get_color()), dash_of(drawn)), label)
     return names
+
+
+def _joined(pieces: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Lines (K, 2) as one, with gaps between them."""
+    rows = [row for piece in pieces for row in (piece, np.full((1, 2), np.nan))]
+    both = np.concatenate(rows) if rows else np.empty((0, 2))
+    return both[:, 0], both[:, 1]
 
 
 class _Axes:
@@ -173,18 +180,19 @@ class _Axes:
         self.traces.append(line(name, ends, np.array([value, value]), Look(colour, dash), width=1.0))
 
     def _areas(self, drawn: PolyCollection) -> None:
-        faces = drawn.get_facecolor()
+        faces = np.atleast_2d(np.asarray(drawn.get_facecolor(), np.float64))
         label = str(drawn.get_label())
         for number, path in enumerate(drawn.get_paths()):
-            colour = to_hex(faces[min(number, len(faces) - 1)], keep_alpha=True)
+            colour = to_hex(tuple(faces[min(number, len(faces) - 1)].tolist()), keep_alpha=True)
+            corners = np.asarray(path.vertices, np.float64)
             self.traces.append(
                 {
                     "type": "scatter",
                     "mode": "lines",
                     "fill": "toself",
                     "name": "" if label.startswith("_") else label,
-                    "x": np.asarray(path.vertices[:, 0], np.float64),
-                    "y": np.asarray(path.vertices[:, 1], np.float32),
+                    "x": corners[:, 0],
+                    "y": corners[:, 1].astype(np.float32),
                     "line": {"width": 0.5, "color": colour[:7]},
                     "fillcolor": colour,
                     "hoverinfo": "skip",
@@ -192,16 +200,11 @@ class _Axes:
             )
 
     def _segments(self, drawn: LineCollection) -> None:
-        colour = to_hex(drawn.get_color()[0])
-        styles = drawn.get_linestyle()
-        pattern = styles[0][1] if styles else None
+        colours = np.atleast_2d(np.asarray(drawn.get_color(), np.float64))
         label = str(drawn.get_label())
-        x, y = [], []
-        for piece in drawn.get_segments():
-            x += [*piece[:, 0].tolist(), np.nan]
-            y += [*piece[:, 1].tolist(), np.nan]
-        look = Look(colour, "dash" if pattern else "solid")
-        self.traces.append(line("" if label.startswith("_") else label, np.array(x), np.array(y), look, width=2.0))
+        x, y = _joined([np.asarray(piece, np.float64) for piece in drawn.get_segments()])
+        look = Look(to_hex(tuple(colours[0].tolist())), "dash" if is_dashed(drawn) else "solid")
+        self.traces.append(line("" if label.startswith("_") else label, x, y, look, width=2.0, bins=len(x)))
 
     def _span(self, drawn: Rectangle) -> None:
         colour = to_hex(drawn.get_facecolor())
@@ -233,14 +236,10 @@ class _Axes:
 
     def _contours(self, drawn: ContourSet) -> None:
         for level, path in zip(drawn.levels, drawn.get_paths(), strict=True):
-            x, y = [], []
-            for piece in path.to_polygons(closed_only=False):
-                x += [*piece[:, 0].tolist(), np.nan]
-                y += [*piece[:, 1].tolist(), np.nan]
-            if x:
-                self.traces.append(
-                    line(f"{level:g}", np.array(x), np.array(y), Look("#000000", "solid"), width=0.8, bins=len(x))
-                )
+            x, y = _joined([np.asarray(piece, np.float64) for piece in path.to_polygons(closed_only=False)])
+            if len(x):
+                look = Look(BLACK, "solid")
+                self.traces.append(line(f"{level:g}", x, y, look, width=0.8, bins=len(x)))
 
     def _places(self) -> None:
         """Named places become points whose names the caption holds."""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import LineCollection
 from matplotlib.colors import BoundaryNorm, to_hex, to_rgba
 from matplotlib.image import AxesImage
 from matplotlib.lines import Line2D
@@ -27,6 +28,11 @@ def dash_of(line: Line2D) -> str:
     if len(pattern) > 2:
         return "dashdot"
     return "dot" if pattern[0] <= 2.0 else "dash"
+
+
+def is_dashed(lines: LineCollection) -> bool:
+    """Whether the lines of a collection have dashes."""
+    return any(isinstance(style, tuple) and style[1] is not None for style in list(lines.get_linestyle()))
 
 
 def has_line(line: Line2D) -> bool:

@@ -116,7 +116,7 @@ def _reflectivity(log: FlightLog, array: Node) -> Trace:
     seen = np.array([reflectivity_at(drawn, tuple(direction.tolist())) for direction in at])
     return {
         "type": "heatmap", "x": lon, "y": lat, "z": np.asarray(seen.reshape(across.shape), np.float32),
-        "colorscale": [[0.0, "#b9c0c8"], [1.0, "#ffffff"]], "showscale": False, "zmin": 0.0, "zmax": 1.0,
+        "colorscale": [[0.0, "#b9c0c8"], [1.0, "#fdfdfd"]], "showscale": False, "zmin": 0.0, "zmax": 1.0,
         "hovertemplate": "reflectivity %{z:.2f}<extra></extra>",
     }  # fmt: skip
 

@@ -2,111 +2,21 @@
 """The page of a flight: its numbers are the flight's, its texts harmless, its bytes the same each time."""
 
 import json
-from html.parser import HTMLParser
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from synthetic_flight import columns, estimates, record, stamps, tilted, truth
+from page_flight import SIGMA, SPIKE, STEPS, flight
+from page_reader import read
+from synthetic_flight import estimates, record, tilted
 
 from css_analysis.flight_log import read_flight
 from css_common.mission import load_mission
-from css_msgs.msg import ControlStatus, CssVoltages, RodDipoleCommand, SpacecraftState, SunEstimate, WheelState
+from css_msgs.msg import SunEstimate
 from css_report.commands.report import main
-from css_report.embedded import decoded
 from css_report.flight_page import flight_page, read_for_page
 from css_report.html_page import html_of
 
-STEPS = 9000
-SPIKE = 4321
-SIGMA = 0.01
 HOSTILE = '</script><script>alert("x")</script><!-- & \u2028'
-
-
-class Reader(HTMLParser):
-    """What a browser would find: elements that are never closed, data of plots, scripts, texts."""
-
-    EMPTY = ("meta", "link", "img", "br", "circle", "path", "rect")
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.ids: list[str] = []
-        self.plots: dict[str, Any] = {}
-        self.scripts = 0
-        self.texts: list[str] = []
-        self.legend: dict[str, list[str]] = {}
-        self.outside: list[str] = []
-        self._figure = ""
-        self._data = ""
-
-    def handle_starttag(self, tag, attrs):
-        given = dict(attrs)
-        if "id" in given:
-            self.ids.append(given["id"])
-        self.outside += [
-            given[key] for key in ("src", "href") if key in given and not given[key].startswith(("data:", "#"))
-        ]
-        if tag == "figure":
-            self._figure = given.get("id", "")
-        if tag == "button" and "data-name" in given:
-            self.legend.setdefault(self._figure, []).append(given["data-name"])
-        if tag not in self.EMPTY:
-            self.open.append(tag)
-        if tag == "script":
-            self._data = given.get("type", "")
-            self.scripts += not self._data
-
-    def handle_endtag(self, tag):
-        if tag in self.EMPTY:
-            return
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] == "script":
-            if self._data == "application/json":
-                self.plots[self._figure] = json.loads(data)
-        elif self.open and self.open[-1] != "style":
-            self.texts.append(data)
-
-    def trace(self, plot: str, name: str) -> dict[str, Any]:
-        """A trace with its arrays as numbers."""
-        (found,) = [trace for trace in self.plots[plot]["traces"] if trace["name"] == name]
-        return {
-            key: decoded(value) if isinstance(value, dict) and "bdata" in value else value
-            for key, value in found.items()
-        }
-
-
-def read(text: str) -> Reader:
-    reader = Reader()
-    reader.feed(text)
-    reader.close()
-    assert reader.open == []
-    return reader
-
-
-def flight(folder: Path, mission: str = "") -> Path:
-    """A recording with everything that a page can show; one sample of a cell's output is a spike."""
-    pointing = 90.0 * np.exp(-np.arange(STEPS) / 900.0) + 5.0
-    lit = np.where(np.arange(STEPS) < 6000, 1.0, 0.0)
-    cells = columns(CssVoltages, stamps(STEPS), voltages=0.5)
-    cells.voltages[SPIKE, 3] = 1.25
-    covariance = np.tile((SIGMA**2 * np.eye(3)).ravel(), (STEPS, 1))
-    ekf = estimates(tilted(pointing + 1.0), covariance=covariance, nis=2.0, nis_dof=2, lit_mask=0b1011, rate_source=1)
-    ekf.validity[:100] = 0
-    ekf.isolated[5000:] = 0b100
-    control = columns(ControlStatus, stamps(STEPS), mode=np.where(np.arange(STEPS) < 3000, 3, 4), reason=4)
-    topics = {
-        "/truth": (SpacecraftState, truth(pointing, lit, r_n=[[7e6, 0.0, 0.0]], omega_bn_b=[[0.01, 0.0, 0.0]])),
-        "/css/voltages": (CssVoltages, cells),
-        "/ekf/sun_estimate": (SunEstimate, ekf),
-        "/wheels/state": (WheelState, columns(WheelState, stamps(STEPS), speed=10.0)),
-        "/rods/dipole_command": (RodDipoleCommand, columns(RodDipoleCommand, stamps(STEPS), dipole=0.1)),
-        "/control/status": (ControlStatus, control),
-    }
-    return record(folder, topics, mission)
 
 
 @pytest.fixture(scope="module")
