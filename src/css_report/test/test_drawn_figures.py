@@ -89,7 +89,9 @@ def test_a_large_map_keeps_its_largest_value(tmp_path):
         axes.set_xlabel("azimuth [deg]")
         axes.set_ylabel("angle [deg]")
         save(drawn, tmp_path / "map.png")
-    (plot,) = plots_of(drawn, "map") or ()
+    plots = plots_of(drawn, "map")
+    assert plots is not None
+    (plot,) = plots
     (trace,) = plot.traces
     row, column = np.unravel_index(np.argmax(trace["z"]), trace["z"].shape)
     assert trace["z"].max() == 5.0 and trace["z"].shape == (360, 720)
