@@ -16,7 +16,9 @@ from css_report.flight_page import Flight, flight_page
 from css_report.places import page_of
 
 
-def write_flight_page(log: FlightLog, runs: Sequence[Run], flown: FaultsFlown, result: FlightResult) -> Path | None:
+def write_flight_page(
+    log: FlightLog, runs: Sequence[Run], flown: FaultsFlown, result: FlightResult, spinning: Sequence[str] = ()
+) -> Path | None:
     """Writes the page of a flight beside its recording; None: it could not be written, which is said.
 
     Args:
@@ -24,11 +26,12 @@ def write_flight_page(log: FlightLog, runs: Sequence[Run], flown: FaultsFlown, r
         runs: figures of merit of its estimators.
         flown: its faults, and what was found of them.
         result: how it ended.
+        spinning: lines about a payload that spins.
     """
     assert result.bag is not None  # or there were no log
     remarks = [*result.warnings, *([f"the flight failed: {result.failure}"] if result.failure else [])]
     remarks += ["the flight was interrupted"] if result.interrupted else []
-    return _write("fly", log, runs, result.bag, flown, remarks)
+    return _write("fly", log, runs, result.bag, flown, remarks, spinning)
 
 
 def write_demo_page(log: FlightLog, runs: Sequence[Run], bag: Path, replayed: ReplayResult) -> Path | None:
@@ -53,9 +56,15 @@ def write_replay_page(result: ReplayResult) -> Path | None:
 
 
 def _write(
-    prog: str, log: FlightLog, runs: Sequence[Run], bag: Path, flown: FaultsFlown, remarks: list[str]
+    prog: str,
+    log: FlightLog,
+    runs: Sequence[Run],
+    bag: Path,
+    flown: FaultsFlown,
+    remarks: Sequence[str],
+    spinning: Sequence[str] = (),
 ) -> Path | None:
-    flight = Flight(log, runs, provenance_of(bag), flown, remarks)
+    flight = Flight(log, runs, provenance_of(bag), flown, remarks, spinning)
     return write_page_after(prog, lambda: flight_page(flight), page_of(bag))
 
 

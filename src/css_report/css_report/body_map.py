@@ -11,7 +11,7 @@ from css_analysis.palette import BLACK, ORANGE, VERMILION
 from css_common.schema import Values
 from css_environment.albedo import transmission
 from css_report.blocks import Block, Plot, Table
-from css_report.looks import Look, look
+from css_report.looks import OUTLINES, Look, look
 from css_report.traces import Trace, dots
 from css_sensors.cells import half_view_cosine
 from css_sim.cell_screen import cell_sides, screen
@@ -120,8 +120,12 @@ def _views(values: Values, axes: np.ndarray) -> Iterator[Trace]:
         seen = np.array([transmission(hidden_by, float(sides[i]), tuple(e.tolist())) > 0.0 for e in edge_b])
         at = map_coordinates(axes, edge_b)
         at[~seen] = np.nan
-        of = look(i)
-        yield _broken(at, {"name": f"view of cell {i}", "line": {"color": of.colour, "dash": of.dash, "width": 1.6}})
+        stroke = {
+            "color": look(i).colour,
+            "dash": OUTLINES[i % len(OUTLINES)],
+            "width": 1.6 + 0.8 * (i // len(OUTLINES)),
+        }
+        yield _broken(at, {"name": f"view of cell {i}", "line": stroke})
     at = map_coordinates(axes, values.cells.normals)
     yield {
         "type": "scatter", "mode": "markers+text", "name": "where cells look", "x": at[:, 0].tolist(),
@@ -150,7 +154,7 @@ def _path(name: str, sun_b: np.ndarray, time_s: np.ndarray, axes: np.ndarray, of
     if not np.isfinite(sun_b[rows]).any():
         return
     at = map_coordinates(axes, sun_b[rows])
-    yield _broken(at, {"name": name, "line": {"color": of.colour, "dash": of.dash, "width": 1.3}})
+    yield _broken(at, {"name": name, "line": {"color": of.colour, "dash": of.dash, "width": 1.2 if ends else 1.1}})
     if ends:
         known = np.flatnonzero(np.isfinite(at[:, 0]))
         for word, i, symbol in (("start", known[0], "triangle-up"), ("end", known[-1], "star")):

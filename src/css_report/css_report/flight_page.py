@@ -2,13 +2,15 @@
 """The page of a flight, or of two beside each other."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.faults_flown import NOTHING_FLOWN, FaultsFlown, faults_flown
 from css_analysis.flight_log import FlightLog, read_flight
 from css_analysis.flight_summary import criteria_verdicts, isolated_lines
+from css_analysis.spin_flight import read_spinning
+from css_analysis.spin_summary import spin_lines
 from css_report.blocks import Block, Commands, Listing, Page, Section
 from css_report.body_map import body_blocks
 from css_report.cell_plots import cell_plots
@@ -38,13 +40,15 @@ class Flight:
         provenance: what its recording says of itself.
         flown: its faults, and what was found of them.
         remarks: what else is to be known of it, such as messages that a replay refused.
+        spinning: lines about a payload that spins; none of others.
     """
 
     log: FlightLog
     runs: Sequence[Run]
     provenance: Provenance
     flown: FaultsFlown = NOTHING_FLOWN
-    remarks: list[str] = field(default_factory=list)
+    remarks: Sequence[str] = ()
+    spinning: Sequence[str] = ()
 
     @property
     def name(self) -> str:
@@ -59,7 +63,9 @@ def read_for_page(bag: Path) -> Flight:
         BagError: it cannot be read.
     """
     log = read_flight(bag)
-    return Flight(log, estimator_runs(log), provenance_of(bag), faults_flown(log, bag))
+    spinning = read_spinning(bag)
+    lines = () if spinning is None else spin_lines(spinning)
+    return Flight(log, estimator_runs(log), provenance_of(bag), faults_flown(log, bag), spinning=lines)
 
 
 def flight_page(flight: Flight, against: Flight | None = None) -> Page:
@@ -125,7 +131,7 @@ def _summary(flight: Flight) -> list[Block]:
         blocks.append("No estimate was recorded: there is nothing to measure.")
     if log.truth is None:
         blocks.append("The recording has no truth: errors cannot be told.")
-    blocks += isolated_lines(flight.runs)
+    blocks += [*isolated_lines(flight.runs), *flight.spinning]
     criteria = log.mission.criteria if log.mission is not None else {}
     if criteria:
         verdicts = criteria_verdicts(criteria, flight.runs)

@@ -128,7 +128,7 @@ def _pointing_error(scene: Scene) -> Plot | None:
             traces += _believed_bound(scene, log.flown, degrees)
     if not traces:
         return None
-    traces += [level(30.0, "30 deg: power positive", scene.span), level(15.0, "15 deg", scene.span)]
+    traces += [level(30.0, "30 deg: power positive", scene.span), level(15.0, "15 deg", scene.span, "longdashdot")]
     return scene.plot("pointing-error", "Array normal to Sun", "angle [deg]", traces, y={"rangemode": "tozero"})
 
 
@@ -237,7 +237,7 @@ def _rate_axes(scene: Scene) -> Plot | None:
         if name is not None:
             rates = _rates(estimates[name])[:, i]
             if np.isfinite(rates).any():
-                traces.append(line(f"{axis}: by {name}", scene.time(estimates[name]), rates, look(i).dashed("dot")))
+                traces.append(line(f"{axis}: by {name}", scene.time(estimates[name]), rates, look(i).beside()))
     return scene.plot("rate-axes", "Body rate by axis", "rate [deg/s]", traces) if traces else None
 
 
@@ -247,7 +247,7 @@ def _wheel_speed(scene: Scene) -> Plot | None:
         return None
     traces = _each(scene, wheels, wheels.speed * RPM, "wheel {}")
     if true is not None:
-        traces += [t | {"line": t["line"] | {"dash": "dot"}} for t in _each(scene, true, true.speed * RPM, "{}: true")]
+        traces += _each(scene, true, true.speed * RPM, "wheel {}: true", beside=True)
     return scene.plot("wheel-speed", "Wheel speed", "speed [rpm]", traces)
 
 
@@ -256,8 +256,7 @@ def _wheel_torque(scene: Scene) -> Plot | None:
     if scene.log.torque_command is not None:
         traces += _each(scene, scene.log.torque_command, 1e3 * scene.log.torque_command.torque, "wheel {}: commanded")
     if scene.log.wheels is not None:
-        given = _each(scene, scene.log.wheels, 1e3 * scene.log.wheels.torque, "wheel {}: given")
-        traces += [t | {"line": t["line"] | {"dash": "dot"}, "mode": "lines"} for t in given]
+        traces += _each(scene, scene.log.wheels, 1e3 * scene.log.wheels.torque, "wheel {}: given", beside=True)
     return scene.plot("wheel-torque", "Wheel torque", "torque [mN m]", traces) if traces else None
 
 
@@ -268,9 +267,10 @@ def _rods(scene: Scene) -> Plot | None:
     return scene.plot("rods", "Torque rods", "dipole [A m^2]", _each(scene, rods, rods.dipole, "rod {}"))
 
 
-def _each(scene: Scene, columns: Columns, values: np.ndarray, name: str) -> list[Trace]:
+def _each(scene: Scene, columns: Columns, values: np.ndarray, name: str, *, beside: bool = False) -> list[Trace]:
     time = scene.time(columns)
-    return [line(name.format(i), time, values[:, i], look(i)) for i in range(values.shape[1])]
+    looks = [look(i).beside() if beside else look(i) for i in range(values.shape[1])]
+    return [line(name.format(i), time, values[:, i], of) for i, of in enumerate(looks)]
 
 
 def _modes(scene: Scene) -> Plot | None:

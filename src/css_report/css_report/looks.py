@@ -17,11 +17,17 @@ class Look(NamedTuple):
     dash: str = "solid"
     marker: str = ""  # empty: none
 
+    def beside(self) -> "Look":
+        """The look of a second line of the same thing: dotted, with the same marker hollow."""
+        return Look(self.colour, "dot", f"{self.marker}-open" if self.marker else "")
+
     def dashed(self, dash: str) -> "Look":
         """The same colour, without markers and with another dash."""
         return Look(self.colour, dash)
 
 
+OUTLINES = ("solid", "dash", "dot", "dashdot", "longdash", "longdashdot", "1px,5px", "9px,2px,2px,2px,2px,2px")
+"""Dashes of outlines, which have no markers."""
 TRUE = Look(BLACK)
 """Of what is true."""
 LEVEL = Look(GREY, "dash")

@@ -59,7 +59,8 @@ def swatch_of(
         width: of the line [px].
     """
     pieces = []
-    dashes = f' stroke-dasharray="{_DASHES[dash]}"' if dash in _DASHES else ""
+    pattern = _DASHES.get(dash, dash.replace("px", "").replace(",", " ") if "px" in dash else "")
+    dashes = f' stroke-dasharray="{pattern}"' if pattern else ""
     if swatch == "area":
         pieces.append(
             f'<rect x="1.5" y="1.5" width="31" height="11" style="fill:{_themed(colour)};fill-opacity:.35;'
@@ -70,8 +71,9 @@ def swatch_of(
             f'<path d="M1 7h32" style="stroke:{_themed(colour)};stroke-width:{min(max(width, 1.5), 8.0):g}"{dashes}/>'
         )
     if marker:
-        drawn = _MARKERS.get(marker, _MARKERS["circle"])
-        pieces.append(f'<g style="fill:{_themed(colour)};stroke:{_themed(colour)}">{drawn}</g>')
+        drawn = _MARKERS.get(marker.removesuffix("-open"), _MARKERS["circle"])
+        fill = "var(--card)" if marker.endswith("-open") else _themed(colour)
+        pieces.append(f'<g style="fill:{fill};stroke:{_themed(colour)}">{drawn}</g>')
     return f'<svg width="34" height="14" fill="none" aria-hidden="true">{"".join(pieces)}</svg>'
 
 

@@ -67,9 +67,9 @@ def band(name: str, x: np.ndarray, low: np.ndarray, high: np.ndarray, look: Look
     ]
 
 
-def level(value: float, name: str, x: tuple[float, float]) -> Trace:
+def level(value: float, name: str, x: tuple[float, float], dash: str = LEVEL.dash) -> Trace:
     """A horizontal line with a meaning."""
-    return line(name, np.array(x), np.array([value, value]), LEVEL, width=1.0) | {"hoverinfo": "skip"}
+    return line(name, np.array(x), np.array([value, value]), LEVEL.dashed(dash), width=1.0) | {"hoverinfo": "skip"}
 
 
 def spans_of(time: np.ndarray, on: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

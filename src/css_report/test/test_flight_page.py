@@ -101,8 +101,7 @@ def test_lines_differ_without_colour(page):
             look = (trace["line"].get("dash"), trace["line"]["width"], trace.get("marker", {}).get("symbol"))
             looks.setdefault(look, set()).add(trace["name"])
         alike = [names for names in looks.values() if len(names) > 1]
-        # axes of a rate, true against estimated, and commanded against given, differ in pairs of colour and marker
-        assert name in {"pointing-error", "rate-axes", "wheel-torque", "body-map"} or alike == [], (name, alike)
+        assert alike == [], (name, alike)
 
 
 def test_legends_name_what_is_drawn(page):

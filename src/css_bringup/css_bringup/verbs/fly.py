@@ -59,13 +59,14 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool, with_page
         complain("warning:", line)
     result.warnings += failed.warnings
     spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
-    for line in spin_lines(spinning) if spinning is not None else ():
+    told = [] if spinning is None else spin_lines(spinning)
+    for line in told:
         console.print(line, soft_wrap=True)
     flown = not (result.failure or result.interrupted)
     missed = unmet(result, runs) if flown and result.bag is not None else []
     for line in missed:
         complain("criterion missed:", line)
-    page = None if log is None or not with_page else write_flight_page(log, runs, failed, result)
+    page = None if log is None or not with_page else write_flight_page(log, runs, failed, result, told)
     print_incidents(result)
     if as_json:
         print_json(
