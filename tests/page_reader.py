@@ -22,6 +22,7 @@ class Reader(HTMLParser):
         self.texts: list[str] = []
         self.legend: dict[str, list[str]] = {}
         self.outside: list[str] = []
+        self.cells: list[str] = []
         self._figure = ""
         self._data = ""
 
@@ -31,6 +32,8 @@ class Reader(HTMLParser):
             self.ids.append(given["id"] or "")
         links = [given[key] or "" for key in ("src", "href") if key in given]
         self.outside += [link for link in links if not link.startswith(("data:", "#"))]
+        if tag in ("td", "th"):
+            self.cells.append("")
         if tag == "figure":
             self._figure = given.get("id") or ""
         if tag == "button" and "data-name" in given:
@@ -52,6 +55,8 @@ class Reader(HTMLParser):
                 self.plots[self._figure] = json.loads(data)
         elif self.open and self.open[-1] != "style":
             self.texts.append(data)
+            if self.open[-1] in ("td", "th"):
+                self.cells[-1] += data
 
     def trace(self, plot: str, name: str) -> dict[str, Any]:
         """The one trace of a name, with its arrays as numbers."""

@@ -2,6 +2,7 @@
 """Writing a page, and what is said of it."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,6 +39,8 @@ def write_html(page: Page, file: Path) -> PageFile:
         temporary.write_bytes(data)
         os.replace(temporary, file)
     except OSError as error:
-        temporary.unlink(missing_ok=True)
         raise ReportError(f"{file}: the page cannot be written: {error.strerror}") from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
     return PageFile(file, len(data), [anchor(section.title) for section in page.sections])
