@@ -8,7 +8,7 @@ from synthetic_flight import estimates, record, tilted
 
 from css_msgs.msg import SunEstimate
 from css_report.after_run import write_page_after
-from css_report.blocks import Beside, Commands, Link, Listing, Page, Picture, Plot, Section, Table
+from css_report.blocks import Beside, Block, Commands, Link, Listing, Page, Picture, Plot, Section, Table
 from css_report.commands.report import main
 from css_report.html_page import html_of
 from css_report.places import page_of
@@ -48,15 +48,20 @@ def test_pages_lie_beside_what_they_show(tmp_path):
 
 @pytest.mark.parametrize(("opens", "code"), [(True, 0), (False, 1)])
 def test_a_browser_is_started_or_the_exit_code_says_that_none_is(bag, monkeypatch, capsys, opens, code):
-    asked = []
-    monkeypatch.setattr(webbrowser, "open", lambda address: asked.append(address) or opens)
+    asked: list[str] = []
+
+    def started(address: str) -> bool:
+        asked.append(address)
+        return opens
+
+    monkeypatch.setattr(webbrowser, "open", started)
     assert main([str(bag), "--open"]) == code
     assert asked == [bag.with_suffix(".html").absolute().as_uri()]
     assert ("no browser could be started" in capsys.readouterr().err) is not opens
 
 
 def test_every_block_has_a_form():
-    blocks = [
+    blocks: list[Block] = [
         "text <b>",
         Listing(["one", "two"]),
         Commands([("what", "./sunpoint fly 'a b'")]),
