@@ -86,16 +86,16 @@ def test_histograms_count_every_case_once(page):
     assert sum(bars["y"]) == pytest.approx(100.0)
     last = bars["y"][-1]
     assert last == pytest.approx(100.0 / 30.0)
-    # Wilson, 1 of 30
-    assert last + bars["error_y"]["array"][-1] == pytest.approx(16.67, abs=0.01)
-    assert last - bars["error_y"]["arrayminus"][-1] == pytest.approx(0.59, abs=0.01)
+    # Clopper & Pearson, 1 of 30
+    assert last + bars["error_y"]["array"][-1] == pytest.approx(17.22, abs=0.01)
+    assert last - bars["error_y"]["arrayminus"][-1] == pytest.approx(0.084, abs=0.001)
     patterns = [trace["marker"]["pattern"]["shape"] for trace in page.plots["cases-converging-s"]["traces"]]
     assert len(set(patterns)) == len(patterns)
 
 
 def test_cases_without_a_value_are_said(page):
     assert any("ekf (gyro): 1 of 30 cases have no value" in text for text in page.texts)
-    assert any(text.startswith("96.7% (83.3% to 99.4%)") for text in page.texts)
+    assert any(text.startswith("96.7% (82.8% to 99.9%)") for text in page.texts)
 
 
 def test_the_worst_come_first():

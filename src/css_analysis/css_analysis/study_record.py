@@ -29,7 +29,7 @@ class StudyRecord:
         manifest: what was asked for.
         cases: one row per configuration and case: estimator, gyro, overrides, case and the quantities of
             `css_analysis.quantities`; null what is not of the kind of the estimator. With faults in the mission,
-            `faults` lists those of the case.
+            `faults` lists those of the case; `drawn.KEY` is what the case drew for a dispersed parameter.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
     """
 

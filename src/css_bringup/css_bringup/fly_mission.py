@@ -3,7 +3,7 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from css_bringup.composed import ComposedFlight
 from css_bringup.flight_result import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
 from css_common import domains, network, places, security
+from css_common.component import Component
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_common.progress_lines import ProgressLines, still_working
@@ -49,8 +50,23 @@ def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: C
             os.environ.update({name: value for name, value in before.items() if value is not None})
 
 
+Ends = Callable[[ComposedFlight], str]
+"""Why a flight is to end early, asked now and then; empty: it goes on."""
+
+
+def _goes_on(flight: ComposedFlight) -> str:
+    return ""
+
+
 def fly(
-    mission: Mission, bag: Path | None, *, processes: bool, console: Console, overwrite: bool = False
+    mission: Mission,
+    bag: Path | None,
+    *,
+    processes: bool,
+    console: Console,
+    overwrite: bool = False,
+    ends: Ends = _goes_on,
+    stand_ins: Mapping[str, type[Component]] | None = None,
 ) -> FlightResult:
     """Flies a mission to its end, or until Ctrl-C or SIGTERM, after which the recording is complete up to there.
 
@@ -60,6 +76,8 @@ def fly(
         processes: one process per node instead of one for all.
         console: where progress is shown, when it is a terminal.
         overwrite: replace a recording that is there.
+        ends: why it ends early, in one process.
+        stand_ins: components in the place of those of some nodes, by name; of a flight in one process.
 
     Raises:
         MissionError: a check before the flight refuses the mission; warnings go to standard error and the result.
@@ -68,8 +86,10 @@ def fly(
     report(warnings)
     # noted, not raised: an exception would tear a cycle apart, and a second Ctrl-C the clean-up
     with StopSignal() as stop:
-        way = _fly_processes if processes else _fly_composed
-        result = way(mission, bag, console, stop, overwrite)
+        if processes:
+            result = _fly_processes(mission, bag, console, stop, overwrite)
+        else:
+            result = _fly_composed(mission, bag, console, stop, overwrite, ends, stand_ins or {})
     result.warnings = warnings
     return result
 
@@ -94,25 +114,47 @@ def _fly_processes(
 
 
 def _fly_composed(
-    mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool
+    mission: Mission,
+    bag: Path | None,
+    console: Console,
+    stop: StopSignal,
+    overwrite: bool,
+    ends: Ends,
+    stand_ins: Mapping[str, type[Component]],
 ) -> FlightResult:
-    with ComposedFlight(mission, bag, overwrite=overwrite) as flight:
-        total = mission.values.mission.duration
-        if not _live(console):
-            lines = ProgressLines(f"flying {mission.name}", "s simulated")
-            return flight.fly(lambda seconds: lines.tell(seconds, total), lambda: stop.came)
-        bar = Progress(
-            TextColumn(f"flying {escape(mission.name)}"),
-            BarColumn(),
-            TextColumn("{task.completed:.0f} of {task.total:.0f} s simulated"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-            console=console,
-            transient=True,
-        )
-        with bar:
-            task = bar.add_task("", total=total)
-            return flight.fly(lambda seconds: bar.update(task, completed=seconds), lambda: stop.came)
+    with ComposedFlight(mission, bag, overwrite=overwrite, stand_ins=stand_ins) as flight:
+        reason = ""
+
+        def over() -> bool:
+            nonlocal reason
+            reason = reason or ends(flight)
+            return stop.came or bool(reason)
+
+        result = _with_progress(mission, flight, console, over)
+    if reason:
+        result.failure, result.interrupted = result.failure or reason, False
+    return result
+
+
+def _with_progress(
+    mission: Mission, flight: ComposedFlight, console: Console, stopped: Callable[[], bool]
+) -> FlightResult:
+    total = mission.values.mission.duration
+    if not _live(console):
+        lines = ProgressLines(f"flying {mission.name}", "s simulated")
+        return flight.fly(lambda seconds: lines.tell(seconds, total), stopped)
+    bar = Progress(
+        TextColumn(f"flying {escape(mission.name)}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:.0f} s simulated"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("", total=total)
+        return flight.fly(lambda seconds: bar.update(task, completed=seconds), stopped)
 
 
 def _live(console: Console) -> bool:

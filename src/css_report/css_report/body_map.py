@@ -9,7 +9,7 @@ from css_analysis.body_axes import axes_about, map_coordinates
 from css_analysis.flight_log import FlightLog, angle
 from css_analysis.palette import BLACK, ORANGE, VERMILION
 from css_common.schema import Values
-from css_environment.albedo import transmission
+from css_environment.albedo import Screen, is_blocked, transmission, view_cosine
 from css_report.blocks import Block, Plot, Table
 from css_report.looks import OUTLINES, Look, look
 from css_report.traces import Trace, dots
@@ -89,11 +89,17 @@ def seen_by(values: Values, directions_b: np.ndarray) -> np.ndarray:
 def views(values: Values, directions_b: np.ndarray) -> Iterator[np.ndarray]:
     """(N,) whether each cell in turn sees directions (N, 3) in b."""
     hidden_by, limit = screen(values), half_view_cosine(values)
-    for normal, side in zip(values.cells.normals, cell_sides(values), strict=True):
-        inside = directions_b @ normal >= limit
+    for i, (normal, side) in enumerate(zip(values.cells.normals, cell_sides(values), strict=True)):
+        inside = directions_b @ normal >= view_cosine(hidden_by, i, limit)
         rows = np.flatnonzero(inside)
-        inside[rows] = [transmission(hidden_by, float(side), tuple(directions_b[i].tolist())) > 0.0 for i in rows]
+        inside[rows] = [_passes(hidden_by, i, float(side), directions_b[row]) for row in rows]
         yield inside
+
+
+def _passes(hidden_by: Screen, i: int, side: float, direction_b: np.ndarray) -> bool:
+    """Whether light from a direction passes what is in front of a cell."""
+    x, y, z = direction_b.tolist()
+    return transmission(hidden_by, side, (x, y, z)) > 0.0 and not is_blocked(hidden_by, i, (x, y, z))
 
 
 def _coverage_trace(coverage: np.ndarray) -> Trace:
@@ -109,15 +115,15 @@ def _coverage_trace(coverage: np.ndarray) -> Trace:
 
 def _views(values: Values, axes: np.ndarray) -> Iterator[Trace]:
     """The edge of the view of each cell, and where it looks."""
-    half, turn = np.arccos(half_view_cosine(values)), np.radians(np.arange(0.0, 361.0, 3.0))
+    turn, of_all = np.radians(np.arange(0.0, 361.0, 3.0)), half_view_cosine(values)
     hidden_by, sides = screen(values), cell_sides(values)
     for i, normal in enumerate(values.cells.normals):
-        own = axes_about(normal)
+        own, half = axes_about(normal), np.arccos(view_cosine(hidden_by, i, of_all))
         edge = np.column_stack(
             (np.sin(half) * np.cos(turn), np.sin(half) * np.sin(turn), np.full(len(turn), np.cos(half)))
         )
         edge_b = edge @ own
-        seen = np.array([transmission(hidden_by, float(sides[i]), tuple(e.tolist())) > 0.0 for e in edge_b])
+        seen = np.array([_passes(hidden_by, i, float(sides[i]), e) for e in edge_b])
         at = map_coordinates(axes, edge_b)
         at[~seen] = np.nan
         stroke = {

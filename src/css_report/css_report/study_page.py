@@ -5,24 +5,22 @@ from collections.abc import Iterator
 from itertools import groupby
 from typing import Any
 
-import numpy as np
-
 from css_analysis.flight_metrics import windows_of
+from css_analysis.intervals import Interval
 from css_analysis.quantities import Summary
 from css_analysis.study_criteria import judge
 from css_analysis.study_record import StudyRecord
-from css_analysis.study_summary import summaries_of
+from css_analysis.study_summary import interval_over, rows_of, summaries_of, value_over
 from css_common.mission import mission_from_text
 from css_report.blocks import Block, Commands, Listing, Page, Section, Table
 from css_report.comparison import beside
-from css_report.intervals import Interval, mean_interval, percentile_interval, share_interval
 from css_report.study_commands import WorstCase, mission_reference, worst_cases
-from css_report.study_plots import configuration_label, histogram_plots, percentile_plots, values_of
+from css_report.study_plots import configuration_label, histogram_plots, percentile_plots
 from css_report.tables import NONE, mapping_table
 
 _INTERVALS = (
-    "In brackets: 95 % confidence intervals. Of means by Student's distribution, of shares by Wilson's score, of "
-    "percentiles by order statistics; a largest value has none."
+    "In brackets: 95 % confidence intervals. Of means by bootstrap, of shares by Clopper and Pearson, of percentiles "
+    "by order statistics; a largest value has none."
 )
 
 
@@ -64,7 +62,7 @@ def _sections(study: StudyRecord) -> list[Section]:
         ],
     }
     if parts["Cases"]:
-        parts["Cases"].insert(0, "Bars: share of the cases. Whiskers: its 95 % confidence interval by Wilson's score.")
+        parts["Cases"].insert(0, "Bars: share of the cases. Whiskers: its 95 % interval by Clopper and Pearson.")
     return [Section(title, blocks) for title, blocks in parts.items() if blocks]
 
 
@@ -88,20 +86,12 @@ def _title(summary: Summary) -> str:
 
 
 def _told(study: StudyRecord, labels: dict[str, Any], summary: Summary) -> str:
-    values = values_of(study, labels, summary.of)
-    known = values[np.isfinite(values)]
-    if summary.over == "share":
-        value: float | None = len(known) / len(values)
-        ends = share_interval(len(known), len(values))
-    elif not len(known):
+    cases = rows_of(study.cases, **labels)
+    value = value_over(cases, summary)
+    if value is None:
         return NONE
-    elif summary.over == "p95":
-        value, ends = float(np.percentile(known, 95.0)), percentile_interval(known, 95.0)
-    elif summary.over == "max":
-        return summary.form.format(float(known.max()))
-    else:
-        value, ends = float(np.mean(known)), mean_interval(known)
-    return f"{summary.form.format(value)} ({_ends(ends, summary.form)})"
+    text = summary.form.format(value)
+    return text if summary.over == "max" else f"{text} ({_ends(interval_over(cases, summary), summary.form)})"
 
 
 def _ends(ends: Interval, form: str) -> str:

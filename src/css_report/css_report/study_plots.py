@@ -2,17 +2,18 @@
 """A study as plots: percentiles over the cases against time, and the cases as histograms with confidence intervals."""
 
 from collections.abc import Iterator, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from css_analysis.flight_metrics import Windows
+from css_analysis.intervals import share_interval
 from css_analysis.quantities import Quantity, quantities
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import rows_of
 from css_report.blocks import Plot
-from css_report.intervals import share_interval
 from css_report.looks import look
 from css_report.traces import Trace, band, line
 
@@ -141,11 +142,14 @@ def bin_edges(known: np.ndarray, whole: bool) -> np.ndarray:
     return np.linspace(low, high, min(_BINS, max(int(np.sqrt(len(known))), 4)) + 1)
 
 
+_interval = cache(share_interval)  # fields of many histograms have the same few counts
+
+
 def _bars(label: str, values: np.ndarray, edges: np.ndarray, number: int, count: int) -> Trace:
     cases = len(values)
     counts, _ = np.histogram(values[np.isfinite(values)], edges)
     share = 100.0 * counts / max(cases, 1)
-    ends = [share_interval(int(n), cases) for n in counts]
+    ends = [_interval(int(n), cases) for n in counts]
     # an empty field has an upper end too, but twenty of them would hide the others
     more = [100.0 * (high or 0.0) - s if s > 0.0 else None for (_, high), s in zip(ends, share, strict=True)]
     less = [s - 100.0 * (low or 0.0) for (low, _), s in zip(ends, share, strict=True)]

@@ -3,6 +3,7 @@
 
 import argparse
 import os
+from collections.abc import Mapping
 
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.faults_flown import NOTHING_FLOWN, faults_flown
@@ -16,6 +17,7 @@ from css_bringup.mission_asked_for import mission_of
 from css_bringup.options import complain, console, errors
 from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
+from css_bringup.stand_ins import stand_ins
 from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
@@ -27,6 +29,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.realtime is not None:
         arguments.overrides.append(f"lockstep.realtime_factor={arguments.realtime}")
     mission = mission_of(arguments)
+    components = stand_ins(mission, arguments.components)
+    for text in arguments.components:
+        console.print(f"in the place of a compiled function: {text}", soft_wrap=True)
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
     nodes = [*(node.name for node in mission.nodes), RECORDER]
     enclaves = security.enclaves_of(nodes, arguments.processes)
@@ -34,13 +39,27 @@ def run(arguments: argparse.Namespace) -> int:
         security.enforced(os.environ, arguments.security, enclaves),
         own_domain(mission, arguments.domain, bag, console) as domain,
     ):
-        result = fly(mission, bag, processes=arguments.processes, console=console, overwrite=arguments.overwrite)
+        result = fly(
+            mission,
+            bag,
+            processes=arguments.processes,
+            console=console,
+            overwrite=arguments.overwrite,
+            stand_ins=components,
+        )
     result.domain = domain
     return conclude(mission, result, as_json=arguments.json, with_page=arguments.report)
 
 
-def conclude(mission: Mission, result: FlightResult, *, as_json: bool, with_page: bool = False) -> int:
-    """Prints a flight's result, writes its page and turns it into an exit code."""
+def conclude(
+    mission: Mission,
+    result: FlightResult,
+    *,
+    as_json: bool,
+    further: Mapping[str, object] | None = None,
+    with_page: bool = False,
+) -> int:
+    """Prints a flight's result, writes its page and turns it into an exit code; `further` goes into its JSON object."""
     runs: list[Run] = []
     failed, log = NOTHING_FLOWN, None
     if result.bag is not None and result.steps > 0:
@@ -73,6 +92,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool, with_page
             flight_object(result, runs)
             | {"faults": failed.faults, "detections": failed.objects(), "page": None if page is None else str(page)}
             | ({} if spinning is None else {"spin": spin_object(spinning)})
+            | dict(further or {})
         )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
