@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from css_recording.commands import import_csv
+from css_telemetry.commands import import_csv
 
 FACES = ("px", "mx", "py", "my", "pz", "mz")
 NORMALS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=float)

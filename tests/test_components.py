@@ -24,7 +24,8 @@ def flight_of(name):
 
 def test_every_component_flies_in_one_of_them():
     flown = {node.component for name in (*MISSIONS, *STAND_INS) for node in flight_of(name).nodes}
-    assert flown == set(components())
+    of_devices = {kind for kind in components() if kind.__module__.startswith("css_drivers.")}
+    assert flown == set(components()) - of_devices
 
 
 @pytest.mark.parametrize("name", [*MISSIONS, *STAND_INS])

@@ -10,7 +10,7 @@ from flights import samples
 from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_msgs.msg import SpacecraftState, SunEstimate
-from css_recording.commands.import_csv import main
+from css_telemetry.commands.import_csv import main
 
 CELLS = {
     "css_px": (1, 0, 0), "css_mx": (-1, 0, 0), "css_py": (0, 1, 0),

@@ -49,6 +49,11 @@ def test_the_configurations_of_the_paper_pass(entry):
           "dynamics.initial.omega_deg_s=20000,0,0"], "dynamics: initial.omega_deg_s: up to 20000 deg/s given"),
         (["orbit.source=tle", "orbit.tle_line1=" + 69 * "1", "orbit.tle_line2=" + 69 * "2"], "/**: orbit.tle_line1: "),
         (["rods.fitted=true", "mission.epoch=2036-06-01T00:00:00Z"], "/**: mission.epoch: the flight ends in 2036"),
+        (["wheels.max_torque=1e6"],
+         "/**: wheels.max_torque: up to 2.83e+06 N m given, which in a cycle of 0.1 s makes"),
+        (["dynamics.disturbances.torque=0,0,1e6"], "dynamics: disturbances.torque: up to 1e+06 N m given"),
+        (["mission.period=0.25", "rods.fitted=true", "mrp_control.dumping.enabled=true",
+          "mrp_control.dumping.gain=10"], "mrp_control: dumping.gain: 10 given, 2.5 of a wheel's momentum in a cycle"),
     ],
 )  # fmt: skip
 def test_refused(overrides, words):
@@ -69,11 +74,26 @@ def test_refused(overrides, words):
         (["orbit.altitude=4e8"], "/**: orbit.altitude: 4e+08 given"),
         (["rods.fitted=true", "mission.epoch=2031-06-01T00:00:00Z"], "/**: mission.epoch: the flight ends in 2031"),
         (["dynamics.disturbances.dipole=50,0,0", "mission.duration=86400"], "/**: mission.period: 0.1 given, over"),
+        (["wheels.max_torque=1000"], "/**: wheels.max_torque: up to 2.83e+03 N m given"),
+        (["mission.period=0.25", "rods.fitted=true", "mrp_control.dumping.enabled=true",
+          "mrp_control.dumping.gain=5"], "mrp_control: dumping.gain: 5 given, 1.25 of a wheel's momentum in a cycle"),
+        (["mission.period=1.0", "mrp_control.reference.spin_deg_s=60"], "mrp_control: reference.spin_deg_s: 60 given"),
     ],
-)
+)  # fmt: skip
 def test_warned(overrides, words):
     warnings = preflight(short_mission(60.0, *overrides))
     assert any(line.partition("okeefe_2013.yaml: ")[2].startswith(words) for line in warnings), warnings
+
+
+@pytest.mark.parametrize(("gain", "refused"), [(0.015, False), (0.021, True)])
+def test_rods_that_take_more_than_twice_the_rate_are_refused(gain, refused):
+    """The moment about the spin axis' neighbour is 0.01 kg m^2, and a command is held for a second."""
+    mission = load_mission("cubesat_3u_safe", [f"magnetic_control.gains.damping={gain}"])
+    if refused:
+        with pytest.raises(MissionError, match=r"takes 2\.1 of the body rate at a time, .*: from 2 on the rate grows"):
+            preflight(mission)
+    else:
+        assert any("takes 1.5 of the body rate" in line for line in preflight(mission))
 
 
 def with_event(parameter, value):

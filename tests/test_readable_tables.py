@@ -12,8 +12,8 @@ from css_analysis.flight_summary import criteria_failures, criteria_verdicts, su
 from css_analysis.quantities import flight_quantities, summaries
 from css_analysis.readable_table import ReadableTable
 from css_common.mission import load_mission
+from css_monte_carlo.study_tables import _study_table
 from css_monte_carlo.verbs.coverage import _print_tables, study
-from css_monte_carlo.verbs.monte_carlo import _study_table
 
 WIDTHS = (12, 20, 40, 60, 80, 120)
 
@@ -112,7 +112,8 @@ def configuration(estimator, gyro, scale, first):
     keys += ("converging_max_s", "rate_50min_deg_s", "rate_knowledge_50min_deg_s")
     overrides = [f"css_array.scale_cell_error={scale}", "css_array.noise=0.5"]
     figures = {key: first + i for i, key in enumerate(keys)}
-    return {"estimator": estimator, "gyro": gyro, "overrides": overrides, **figures}
+    interval = {key: (None, None) for key in keys}
+    return {"estimator": estimator, "gyro": gyro, "overrides": overrides, "interval_95": interval, **figures}
 
 
 COLUMNS = summaries(Windows(report_time=3000.0))

@@ -12,7 +12,7 @@ from css_analysis.commands import slit_analyse
 from css_bringup.commands import fly, replay
 from css_bringup.replay_bag import default_replay
 from css_common.command import USAGE
-from css_recording.commands import import_csv
+from css_telemetry.commands import import_csv
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("src/*/README.md"), *ROOT.glob("b*/README.md"))
@@ -80,7 +80,8 @@ def test_a_flight_and_its_replays_do_not_collide(place, monkeypatch, capfd):
 
 def test_telemetry_is_imported_and_replayed(place, monkeypatch, capfd):
     monkeypatch.chdir(place)
-    assert import_csv.main(of_verb("import-csv")) == 0
+    assert import_csv.main(of_verb("import-csv", "--describe")) == 0
+    assert import_csv.main(of_verb("import-csv", "bags/mine")) == 0
     assert "broken" not in capfd.readouterr().out
     assert replay.main(of_verb("replay", "bags/mine")) == 0
 

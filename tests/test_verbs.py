@@ -60,10 +60,13 @@ def test_verb_loads_nothing_that_takes_long_before_its_options_are_read(verb):
     assert loaded.isdisjoint(SLOW)
 
 
-@pytest.mark.parametrize(("verb", "executable"), [("record", "recorder"), ("import-csv", "import_csv")])
-def test_without_a_verb_the_name_is_that_of_ros2_run(verb, executable):
-    told = _help("css_recording", executable, f"{verb}x:other")
-    assert told.startswith(f"usage: ros2 run css_recording {executable} [-h]")
+@pytest.mark.parametrize(
+    ("verb", "package", "executable"),
+    [("record", "css_recording", "recorder"), ("import-csv", "css_telemetry", "import_csv")],
+)
+def test_without_a_verb_the_name_is_that_of_ros2_run(verb, package, executable):
+    told = _help(package, executable, f"{verb}x:other")
+    assert told.startswith(f"usage: ros2 run {package} {executable} [-h]")
 
 
 @pytest.mark.parametrize(("package", "executable"), NODES)

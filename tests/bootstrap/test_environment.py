@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The composed environment, and the choice between ROS wheels and a sourced installation."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from bootstrap.environment import (
     changes,
     compose,
+    machine_of,
     ros_source,
     toolchain,
     without_foreign_python,
@@ -18,25 +20,37 @@ from bootstrap.project import Environment, Project, Refusal
 from bootstrap.requirements import blocks, for_system
 
 ROOT = Path(__file__).resolve().parents[2]
+PC = "Linux x86_64"
 SOURCED = {"ROS_DISTRO": "jazzy", "AMENT_PREFIX_PATH": "/opt/ros/jazzy"}
 
 
 @pytest.mark.parametrize(
-    ("env", "source"),
-    [
-        ({}, "wheels"),
-        (SOURCED, "system"),
-        ({"ROS_DISTRO": "jazzy"}, "wheels"),
-        ({"AMENT_PREFIX_PATH": "/home/me/overlay"}, "wheels"),
-    ],
+    ("machine", "without"),
+    [(PC, "wheels"), ("Linux aarch64", "none"), ("Darwin arm64", "none"), ("Darwin x86_64", "none")],
 )
-def test_ros_source(env, source):
-    assert ros_source(env) == source
+def test_ros_source(machine, without):
+    assert ros_source({}, machine) == without
+    assert ros_source({"ROS_DISTRO": "jazzy"}, machine) == without
+    assert ros_source({"AMENT_PREFIX_PATH": "/home/me/overlay"}, machine) == without
+    assert ros_source(SOURCED, machine) == "system"
+
+
+def test_the_machine_is_what_the_script_was_told_and_is_handed_on_to_nobody():
+    assert machine_of({"SUNPOINT_MACHINE": "Darwin arm64"}) == "Darwin arm64"
+    here = subprocess.check_output(["uname", "-sm"], text=True).strip()
+    assert machine_of({}) == here
+    assert without_other_sunpoint({"SUNPOINT_MACHINE": here, "A": "b"}) == {"A": "b"}
+
+
+def test_without_ros_nothing_is_said_of_ros(tmp_path):
+    environment = toolchain(Project(tmp_path), "none")
+    assert set(environment.prepend) == {"PATH"}
+    assert not any(name.startswith(("ROS", "AMENT", "_ROS")) for name in environment.assign)
 
 
 def test_other_distributions_are_refused():
     with pytest.raises(Refusal, match="humble") as refusal:
-        ros_source({"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/opt/ros/humble"})
+        ros_source({"ROS_DISTRO": "humble", "AMENT_PREFIX_PATH": "/opt/ros/humble"}, PC)
     assert "jazzy" in refusal.value.remedy
 
 
@@ -104,7 +118,7 @@ def test_an_enclosing_sunpoint_shell_leaves_no_trace(tmp_path, ros):
     inside = compose(user, toolchain(Project(tmp_path / "other"), ros))
     cleaned = without_other_sunpoint(inside)
     assert not any(str(tmp_path) in value for value in cleaned.values())
-    assert ros_source(cleaned) == ros
+    assert ros_source(cleaned, PC) == ros
     assert {name: cleaned[name] for name in user} == user
 
 

@@ -62,7 +62,21 @@ def test_refuses_without_suitable_python(start, fakes, found):
     assert "sudo apt install python3" in errors.splitlines()[1]
 
 
-@pytest.mark.parametrize("machine", ["Linux aarch64", "Darwin x86_64"])
+@pytest.mark.parametrize("machine", ["Linux x86_64", "Linux aarch64", "Darwin arm64", "Darwin x86_64"])
+def test_hands_the_machine_over(start, machine):
+    shown = SUITABLE.replace("started", "on $SUNPOINT_MACHINE started")
+    code, output, errors = start("fly", uname=f'echo "{machine}"', python3=shown)
+    assert (code, errors) == (0, "")
+    assert output.startswith(f"on {machine} started")
+
+
+def test_a_mac_without_python_is_told_of_one_for_macs(start):
+    code, _, errors = start("fly", uname='echo "Darwin arm64"')
+    assert code == 1
+    assert "brew install" in errors
+
+
+@pytest.mark.parametrize("machine", ["Linux riscv64", "Linux armv7l", "FreeBSD amd64"])
 def test_refuses_other_machines(start, machine):
     code, output, errors = start("fly", uname=f'echo "{machine}"', python3=SUITABLE)
     assert (code, output) == (1, "")
@@ -80,11 +94,34 @@ def test_keeps_the_python_of_an_installed_environment(start, tmp_path):
     assert output.startswith("environment -I -S")
 
 
-def test_finds_its_folder_through_a_symbolic_link(start, tmp_path):
-    link = tmp_path / "link"
-    link.symlink_to(tmp_path / "project" / "sunpoint")
-    _, output, _ = start(script=link, python3=SUITABLE)
-    assert f"{tmp_path}/project/tools/bootstrap" in output
+# what an older Mac has: no options, one link at a time
+BSD_READLINK = 'case "$1" in -*) exit 1;; esac; exec {} "$1"'
+
+
+@pytest.mark.parametrize("readlink", [None, BSD_READLINK], ids=["gnu", "bsd"])
+def test_finds_its_folder_through_symbolic_links(start, tmp_path, readlink):
+    fakes = {"readlink": readlink.format(shutil.which("readlink"))} if readlink else {}
+    folder = tmp_path / "a folder"
+    folder.symlink_to("project")
+    (tmp_path / "relative").symlink_to("a folder/sunpoint")
+    (tmp_path / "absolute").symlink_to(tmp_path / "relative")
+    for link in ("relative", "absolute", "a folder/sunpoint"):
+        _, output, errors = start(script=tmp_path / link, python3=SUITABLE, **fakes)
+        assert errors == ""
+        assert f"{tmp_path}/project/tools/bootstrap" in output
+
+
+def test_finds_its_folder_when_its_name_is_all_that_the_shell_was_given(tmp_path):
+    (tmp_path / "bin").mkdir()
+    python = tmp_path / "bin" / "python3"
+    python.write_text(f"#!/bin/sh\n{SUITABLE}\n")
+    python.chmod(0o755)
+    shutil.copy(ROOT / "sunpoint", tmp_path)
+    (tmp_path / "link").symlink_to("sunpoint")
+    for name in ("sunpoint", "link"):
+        env = {"PATH": f"{tmp_path}/bin:{os.environ['PATH']}"}
+        output = subprocess.check_output(["sh", name, "fly"], cwd=tmp_path, env=env, text=True)
+        assert output.endswith(f"{tmp_path}/tools/bootstrap fly\n")
 
 
 def test_script_is_portable_shell():

@@ -31,6 +31,24 @@ def test_unknown_verb_suggests_the_nearest(typed, meant, capsys):
     assert f"did you mean '{meant}'" in capsys.readouterr().err
 
 
+def test_help_says_which_verbs_need_ros_where_there_is_none():
+    assert "need a Jazzy" not in help_text()
+    (told,) = [line for line in help_text("Darwin arm64").splitlines() if "is sourced before" in line]
+    assert {"fly", "record", "play"} <= set(re.findall(r"[\w-]+", told))
+    assert {"monte-carlo", "import-csv", "replay"}.isdisjoint(re.findall(r"[\w-]+", told))
+
+
+@pytest.mark.parametrize("verb", [name for name, verb in VERBS.items() if verb.ros])
+def test_a_verb_that_needs_ros_says_so_in_one_line_and_before_anything_is_set_up(verb, monkeypatch, capsys):
+    monkeypatch.setenv("SUNPOINT_MACHINE", "Linux aarch64")
+    for name in ("ROS_DISTRO", "AMENT_PREFIX_PATH"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(cli, "_prepare", lambda *_: pytest.fail("it began to set something up"))
+    assert main([verb]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith(f"sunpoint: {verb} needs ROS 2 Jazzy") and "source /opt/ros/jazzy" in line
+
+
 def test_unknown_verb_without_a_near_one_points_to_the_help():
     assert "--help" in unknown_verb("zzzzzz")
 

@@ -8,7 +8,15 @@ import signal
 import sys
 from pathlib import Path
 
-from bootstrap.environment import compose, ros_source, without_foreign_python, without_other_sunpoint
+from bootstrap.environment import (
+    DISTRIBUTION,
+    NONE,
+    compose,
+    machine_of,
+    ros_source,
+    without_foreign_python,
+    without_other_sunpoint,
+)
 from bootstrap.plan import find_need
 from bootstrap.project import Project, Refusal, State
 from bootstrap.verbs import JOINING, JOINING_OPTIONS, OWN_USAGE, VERBS, help_text, unknown_verb
@@ -22,9 +30,9 @@ ALL_TESTS = ["-q", "-n", "2", "--dist", "loadfile", "--no-loadscope-reorder"]
 def main(arguments: list[str]) -> int:
     """Run one command line; returns only when no executable has taken over."""
     if not arguments or arguments[0] in ("-h", "--help", "help"):
-        print(help_text())
+        print(help_text(machine_of(os.environ)))
         return 0
-    project = Project(Path(__file__).resolve().parents[2])
+    project = Project(Path(__file__).resolve().parents[2], machine_of(os.environ))
     if arguments[0] == "--version":
         from bootstrap.version import version_text
 
@@ -58,7 +66,12 @@ def _say(line: str) -> None:
 
 def _start(project: Project, verb: str, arguments: list[str]) -> int:
     base, foreign = without_foreign_python(without_other_sunpoint(os.environ))
-    ros = ros_source(base)
+    ros = ros_source(base, project.machine)
+    if ros == NONE and VERBS[verb].ros and not {"-h", "--help"}.intersection(arguments):
+        raise Refusal(
+            f"{verb} needs ROS 2 Jazzy, which has no packages for {project.machine} to install; where one is on this "
+            f"machine: source /opt/ros/{DISTRIBUTION}/setup.bash"
+        )
     state = State.load(project.state_file)
     with_tests = verb in ("test", "lint")
     if find_need(project, ros, state, with_tests):
@@ -72,7 +85,7 @@ def _start(project: Project, verb: str, arguments: list[str]) -> int:
         return _lint(project, env)
     if verb == "test":
         return _test(project, arguments, {**env, "ROS_PYTHON_CHECK_FIELDS": "1"})
-    if verb in JOINING:
+    if verb in JOINING and ros != NONE:
         env, arguments = _join(verb, env, arguments)
     if verb == "shell":
         return _replace_process(_shell(project, arguments), {"ROS_PYTHON_CHECK_FIELDS": "1", **env})

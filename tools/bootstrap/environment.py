@@ -13,14 +13,25 @@ from css_common import places
 DISTRIBUTION = "jazzy"
 WHEELS = "wheels"
 SYSTEM = "system"
+NONE = "none"
+MACHINE = "SUNPOINT_MACHINE"
+WITH_WHEELS = "Linux x86_64"
+"""The machine for which ROS 2 exists as wheels."""
 WHEELS_GUARD = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
+
+
+def machine_of(env: Mapping[str, str]) -> str:
+    """What `uname -sm` said when `./sunpoint` asked it, else what Python knows of it."""
+    here = os.uname()
+    return env.get(MACHINE) or f"{here.sysname} {here.machine}"
 
 
 def without_other_sunpoint(env: Mapping[str, str]) -> dict[str, str]:
     """The environment without what an enclosing `./sunpoint shell` added, of this folder or another."""
+    env = {name: value for name, value in env.items() if name != MACHINE}
     home = env.get("SUNPOINT_HOME")
     if not home:
-        return dict(env)
+        return env
     cleaned = {}
     for name, value in env.items():
         parts = value.split(os.pathsep)
@@ -54,8 +65,12 @@ def _prefixes(env: Mapping[str, str]) -> Iterator[str]:
         yield os.path.join(os.path.dirname(install.rstrip(os.sep)), "build")  # of --symlink-install
 
 
-def ros_source(env: Mapping[str, str]) -> str:
-    """Where ROS 2 comes from: `system` when a Jazzy installation is sourced, else `wheels`.
+def ros_source(env: Mapping[str, str], machine: str) -> str:
+    """Where ROS 2 comes from: `system` when a Jazzy installation is sourced, `wheels` where there are any, else `none`.
+
+    Args:
+        env: the user's environment.
+        machine: what `uname -sm` says, e.g. "Linux aarch64".
 
     Raises Refusal when another distribution is sourced: its messages and libraries do not mix with Jazzy's.
     """
@@ -65,23 +80,20 @@ def ros_source(env: Mapping[str, str]) -> str:
             f"ROS 2 {distribution} is sourced in this shell; Sunpoint is for {DISTRIBUTION}",
             "open a shell that sources no ROS, or: source /opt/ros/jazzy/setup.bash",
         )
-    return SYSTEM if distribution and env.get("AMENT_PREFIX_PATH") else WHEELS
+    if distribution and env.get("AMENT_PREFIX_PATH"):
+        return SYSTEM
+    return WHEELS if machine == WITH_WHEELS else NONE
 
 
 def toolchain(project: Project, ros: str) -> Environment:
     """The environment of the installed tools and ROS, before any package of the workspace is built."""
     root, venv = project.root, project.venv
     environment = Environment(
-        assign={
-            "SUNPOINT_HOME": str(root),
-            "SUNPOINT_ROS": ros,
-            "VIRTUAL_ENV": str(venv),
-            "ROS_DISTRO": DISTRIBUTION,
-            "ROS_VERSION": "2",
-            "ROS_PYTHON_VERSION": "3",
-        },
+        assign={"SUNPOINT_HOME": str(root), "SUNPOINT_ROS": ros, "VIRTUAL_ENV": str(venv)},
         prepend={"PATH": [str(venv / "bin")]},
     )
+    if ros != NONE:
+        environment.assign |= {"ROS_DISTRO": DISTRIBUTION, "ROS_VERSION": "2", "ROS_PYTHON_VERSION": "3"}
     if ros == WHEELS:
         # The wheels' start hook executes Python a second time to set LD_LIBRARY_PATH, unless told it is set.
         environment.assign[WHEELS_GUARD] = "1"

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
+from bootstrap.environment import NONE
 from bootstrap.project import Project
 
 LAYOUT = 1
@@ -18,6 +19,17 @@ BUILD_FILES = ("package.xml", "setup.py", "setup.cfg", "CMakeLists.txt")
 INTERFACE_FOLDERS = ("msg", "srv", "action")
 LISTED_FOLDERS = ("launch", "config", "resource", "data")
 EXECUTABLE_FOLDERS = ("nodes", "commands")
+
+
+INTEL_MAC = "Darwin x86_64"
+
+
+def lock_file(project: Project, ros: str) -> Path:
+    """What is to be installed: everything, or what is left of it where there is no ROS."""
+    if ros != NONE:
+        return project.root / "requirements.lock"
+    own = "-intel-mac" if project.machine == INTEL_MAC else ""
+    return project.root / f"requirements-analysis{own}.lock"
 
 
 def _digest(parts: Iterable[str | bytes]) -> str:
@@ -50,8 +62,9 @@ def installation(project: Project, ros: str) -> str:
     The folder counts because installed scripts carry the absolute path of their Python.
     """
     root = project.root
-    locks = (_read(root / "requirements-uv.lock"), _read(root / "requirements.lock"))
-    return _digest([str(LAYOUT), str(sys.implementation.cache_tag), ros, str(root), *locks])
+    locks = (_read(root / "requirements-uv.lock"), _read(lock_file(project, ros)))
+    others = _names(common_interfaces(project)) if ros == NONE else []
+    return _digest([str(LAYOUT), str(sys.implementation.cache_tag), ros, str(root), *locks, *others])
 
 
 def test_requirements(project: Project) -> str:
@@ -83,6 +96,11 @@ def packages(project: Project) -> dict[str, str]:
         for name in _names(project.source)
         if (project.source / name / "package.xml").is_file()
     }
+
+
+def common_interfaces(project: Project) -> Path:
+    """Copies of ROS's own `.msg` files, a folder for each package, for where there is no ROS."""
+    return project.source / "css_msgs" / "common_interfaces"
 
 
 def has_interfaces(folder: Path) -> bool:

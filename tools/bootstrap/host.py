@@ -11,7 +11,7 @@ import sysconfig
 from collections.abc import Mapping
 from pathlib import Path
 
-from bootstrap.environment import SYSTEM
+from bootstrap.environment import NONE, SYSTEM
 from bootstrap.project import Refusal
 
 OLDEST_PYTHON, NEWEST_PYTHON = (3, 11), (3, 13)
@@ -22,7 +22,7 @@ def check_python_version() -> None:
     """Raises Refusal when an operating system upgrade has changed the Python below `.venv` to an unknown one."""
     if not OLDEST_PYTHON <= sys.version_info[:2] <= NEWEST_PYTHON:
         raise Refusal(
-            f"the Python of .venv has become {sys.version.split()[0]}; ROS packages exist for 3.11 to 3.13",
+            f"the Python of .venv has become {sys.version.split()[0]}; packages exist for 3.11 to 3.13",
             "rm -r .venv   and run it again; it then looks for a suitable python3",
         )
 
@@ -59,7 +59,7 @@ def check_venv_module() -> None:
 
 
 def check_libc() -> None:
-    """Raises Refusal on a C library for which no ROS wheels are built."""
+    """Raises Refusal on a C library for which no wheels are built."""
     try:
         name, version = (os.confstr("CS_GNU_LIBC_VERSION") or "").split()
         suitable = tuple(map(int, version.split("."))) >= OLDEST_GLIBC
@@ -67,7 +67,7 @@ def check_libc() -> None:
         name, version, suitable = "another C library than glibc", "", False
     if not suitable:
         raise Refusal(
-            f"the ROS packages need glibc 2.28 or newer; here is {name} {version}",
+            f"the packages need glibc 2.28 or newer; here is {name} {version}",
             "use Debian 10, Ubuntu 20.04, RHEL 8 or newer, or a container of one",
         )
 
@@ -105,8 +105,10 @@ def check(root: Path, ros: str, env: Mapping[str, str]) -> None:
     check_folder(root)
     if ros == SYSTEM:
         system_python(env)
-    else:
+    elif sys.platform == "linux":
         check_libc()
     check_venv_module()
+    if ros == NONE:
+        return
     check_compiler(env)
     check_python_headers(sysconfig.get_path("include", "posix_prefix"))

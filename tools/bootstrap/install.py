@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from bootstrap import fingerprint, host, requirements, wheels
-from bootstrap.environment import SYSTEM, toolchain
+from bootstrap.environment import NONE, SYSTEM, WHEELS, toolchain
 from bootstrap.progress import Step, say
 from bootstrap.work import Work
 
@@ -26,10 +26,11 @@ def install(work: Work) -> None:
             shutil.rmtree(folder)
     _make_venv(work, log)
     _install_packages(work, log)
-    if work.ros != SYSTEM:
+    if work.ros == WHEELS:
         with Step("adapting the ROS packages to this machine"):
             wheels.mend_cmake_files(project.venv / "share", *_include_folders(work))
-    _install_ros2(work)
+    if work.ros != NONE:
+        _install_ros2(work)
     state = work.state
     state.install, state.test, state.packages = fingerprint.installation(project, work.ros), "", {}
     state.environment = toolchain(project, work.ros)
@@ -58,7 +59,7 @@ def _make_venv(work: Work, log: Path) -> None:
 
 
 def _install_packages(work: Work, log: Path) -> None:
-    lock = work.project.root / "requirements.lock"
+    lock = fingerprint.lock_file(work.project, work.ros)
     # The one package that exists as source only is built with the locked setuptools too.
     options: list[str | Path] = ["--build-constraints", lock]
     if work.ros == SYSTEM:

@@ -23,9 +23,10 @@ class Refusal(Exception):
 
 @dataclass(frozen=True)
 class Project:
-    """The folders of one checkout."""
+    """The folders of one checkout, and the machine that it is used on as `uname -sm` names it."""
 
     root: Path
+    machine: str = "Linux x86_64"
 
     @property
     def venv(self) -> Path:

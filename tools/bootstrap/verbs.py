@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from bootstrap.environment import WITH_WHEELS
+
 JOINING_OPTIONS = """\
   --flight NAME|PID  join this flight when several are running: its mission, recording or process
   --domain N         join this ROS domain
@@ -12,28 +14,44 @@ The ROS domain is that of --domain, --flight or ROS_DOMAIN_ID, else that of the 
 
 
 class Verb(NamedTuple):
-    """One verb; without a package it is done by the bootstrap itself."""
+    """One verb; without a package it is done by the bootstrap itself.
+
+    `ros`: it puts nodes on topics, or tests those, and is refused where there is no ROS.
+    """
 
     summary: str
     package: str = ""
     executable: str = ""
+    ros: bool = False
 
 
 VERBS = {
-    "demo": Verb("fly one orbit, record it, replay it through four estimators, draw it", "css_bringup", "demo"),
-    "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly"),
+    "demo": Verb(
+        "fly one orbit, record it, replay it through four estimators, draw it", "css_bringup", "demo", ros=True
+    ),
+    "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly", ros=True),
     "replay": Verb("step estimators over a recorded bag and compare", "css_bringup", "replay"),
-    "bench": Verb("measure the speed of the graph, and of the Monte Carlo beside Basilisk", "css_bringup", "bench"),
-    "record": Verb("record topics into an MCAP bag", "css_recording", "recorder"),
-    "play": Verb("play a bag onto live topics", "css_recording", "player"),
+    "hil": Verb(
+        "fly a mission in real time with a board in the loop, over serial or UDP", "css_bringup", "hil", ros=True
+    ),
+    "bench": Verb(
+        "measure the speed of the graph, and of the Monte Carlo beside Basilisk", "css_bringup", "bench", ros=True
+    ),
+    "record": Verb("record topics into an MCAP bag", "css_recording", "recorder", ros=True),
+    "play": Verb("play a bag onto live topics", "css_recording", "player", ros=True),
     "recover": Verb("rebuild the bag of a recorder that was killed", "css_recording", "recover"),
-    "import-csv": Verb("turn a table of measurements into a bag", "css_recording", "import_csv"),
+    "import-csv": Verb("turn a table of measurements into a bag", "css_telemetry", "import_csv"),
+    "calibrate": Verb("calibrate cells, magnetometer and gyro from a bag", "css_calibration", "calibrate"),
+    "check": Verb("find the cells of a bag that lie", "css_calibration", "check"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
+    "new": Verb("write the mission of your own spacecraft: gains, gates and steps computed", "css_design", "new"),
+    "layout": Verb("search where the cells should look: error against number of cells", "css_design", "layout"),
+    "budget": Verb("split heading and pointing error by source: predicted, and measured", "css_design", "budget"),
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
     "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
-    "test": Verb("run the linters and all tests, or with arguments those tests alone"),
+    "test": Verb("run the linters and all tests, or with arguments those tests alone", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
 }
@@ -42,8 +60,8 @@ VERBS = {
 JOINING = ("shell", "record", "play")
 
 
-def help_text() -> str:
-    """What `./sunpoint --help` prints."""
+def help_text(machine: str = WITH_WHEELS) -> str:
+    """What `./sunpoint --help` prints on a machine that `uname -sm` names so."""
     width = max(map(len, VERBS))
     table = "\n".join(f"  {name:{width}}  {verb.summary}" for name, verb in VERBS.items())
     return f"""Sunpoint: sun-sensing flight software on ROS 2 Jazzy. Simulated sun sensors, sun-heading
@@ -61,7 +79,17 @@ Missions are files in config/ or anywhere; one may extend another (`extends: OTH
 A flight has a ROS domain for itself. shell, record and play join it; when several are running,
 --flight NAME|PID or --domain N chooses.
 
-./sunpoint VERB --help explains one verb, ./sunpoint --version says which version this is."""
+./sunpoint VERB --help explains one verb, ./sunpoint --version says which version this is.{_without_ros(machine)}"""
+
+
+def _without_ros(machine: str) -> str:
+    if machine == WITH_WHEELS:
+        return ""
+    verbs = ", ".join(name for name, verb in VERBS.items() if verb.ros)
+    return f"""
+
+ROS 2 has no packages for {machine} that could be installed here. These verbs need a Jazzy installation
+that is sourced before: {verbs}. The others do without."""
 
 
 OWN_USAGE = {

@@ -10,7 +10,9 @@ import os
 from collections.abc import Iterator, Mapping
 
 from bootstrap.build import build
+from bootstrap.environment import NONE
 from bootstrap.install import install, install_tests
+from bootstrap.layout import lay_out
 from bootstrap.plan import find_need
 from bootstrap.progress import say, stoppable
 from bootstrap.project import Project, Refusal, State
@@ -34,7 +36,7 @@ def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: boo
             if need.tests:
                 install_tests(work)
             if need.packages or need.removed:
-                build(work, need)
+                (lay_out if ros == NONE else build)(work, need)
             return state
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):

@@ -83,8 +83,10 @@ def _write_comparison(logs: Sequence[FlightLog], labels: Sequence[str], folder: 
             name = log.flown if log.flown in log.estimates else next(iter(log.estimates), None)
             if name is not None:
                 draw_heading_error(heading, log, unit, name, colour, f"{label}: {name}")
-            draw_pointing_error(pointing, log, unit, colour)
-            draw_true_rate(rate, log, unit, colour, label)
+            if not log.imported:
+                draw_pointing_error(pointing, log, unit, colour)
+            if log.knows("rate"):
+                draw_true_rate(rate, log, unit, colour, label)
         for axes, title in zip(
             all_axes, ("Estimated to true Sun", "Array normal to true Sun", "True body rate"), strict=True
         ):

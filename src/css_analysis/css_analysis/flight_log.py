@@ -7,6 +7,7 @@ carry Sunpoint's types. Nothing is required: without truth there are no errors t
 modes.
 """
 
+import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -38,9 +39,7 @@ from css_msgs.msg import (
     WheelTorqueCommand,
 )
 from css_recording.errors import BagError
-
-IMPORTED_FROM = "imported_from"
-"""Entry in the description of a recording that was made of a table of telemetry."""
+from css_recording.provenance import IMPORTED_FROM
 
 SUNLIT_FRACTION = 0.5
 """The flight is sunlit while more than this fraction of the solar disc is in view."""
@@ -101,8 +100,8 @@ class FlightLog:
         faults: those that sensors and actuators told of, node by node.
         health: units that estimators and control held for failed, node by node.
         notes: what could not be read, one line each.
-        imported: it is a table of telemetry; its truth is the Sun in b and perhaps the rate. Orbit, shadow and solar
-            arrays of its mission are unknown.
+        imported: it is a table of telemetry, of whose solar arrays nothing is known.
+        known_truth: parts of its truth that the table has (sun, attitude, rate, position, illumination).
     """
 
     origin: str
@@ -120,6 +119,11 @@ class FlightLog:
     health: list[HealthRecord] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
     imported: bool = False
+    known_truth: frozenset[str] = frozenset()
+
+    def knows(self, part: str) -> bool:
+        """Whether a part of the truth is known; the fields of others hold what stands for nothing."""
+        return self.truth is not None and (not self.imported or part in self.known_truth)
 
     def columns(self) -> list[Columns]:
         """All columns of the log, none of them empty."""
@@ -267,7 +271,7 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
 
     with BagReader(path, remap) as reader:
         mission, notes = None, []
-        imported = IMPORTED_FROM in reader.description
+        origin = reader.description.get(IMPORTED_FROM)
         text = reader.mission_text
         if text is not None:
             try:
@@ -285,13 +289,25 @@ def read_flight(path: str | Path, remap: Mapping[str, str] | None = None) -> Fli
         for topic, _, _, data in reader.messages(messages):
             append[topic](data)
         notes += [*reader.notes, *map(str, reader.refused)]
-    log = FlightLog(str(path), mission, notes=notes, imported=imported)
+    log = FlightLog(str(path), mission, notes=notes, imported=origin is not None)
+    if origin is not None:
+        log.known_truth = _known_truth(origin)
     for topic, (message_type, received) in messages.items():
         if topic not in told:
             log.add(topic, message_type, _whole(topic, codec_of(message_type), _came(received), notes).sorted())
     for topic, kind in sorted(told.items()):
         log.tell(topic, kind, _each_whole(topic, codec_of(kind), messages[topic][1], notes))
     return log
+
+
+def _known_truth(origin: str) -> frozenset[str]:
+    """What an import says that it knows; those that do not say knew the Sun, and the rate if it was there."""
+    try:
+        told = json.loads(origin)
+    except ValueError:
+        told = None
+    parts = told.get("truth") if isinstance(told, dict) else None
+    return frozenset(map(str, parts)) if isinstance(parts, list) else frozenset(("sun", "rate"))
 
 
 def _names_on(topic: str, mission: Mission | None) -> Units:

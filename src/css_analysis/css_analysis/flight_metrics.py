@@ -118,7 +118,7 @@ class FlightMeasures:
 
     @cached_property
     def knows_arrays(self) -> bool:
-        """Whether the log says where solar arrays and shadow are."""
+        """Whether the log says where the solar arrays are."""
         return self.log.truth is not None and not self.log.imported
 
     def power_positive_s(self) -> float | None:
@@ -154,7 +154,7 @@ class FlightMeasures:
 
     def detumbled_s(self) -> float | None:
         """Time from which the body rate stays low for 60 s."""
-        if self.log.truth is None:
+        if not self.log.knows("rate"):
             return None
         return self._time_of(_lasting(self.log, self.log.rate < np.radians(self.windows.detumbled_rate_deg_s)))
 
@@ -168,9 +168,9 @@ class FlightMeasures:
         return None if step is None or truth is None else float(self.log.time(truth)[step])
 
     def rate_final_deg_s(self) -> float | None:
-        """Mean rate at the end; a table without rates has zeros there."""
+        """Mean rate at the end."""
         truth = self.log.truth
-        if truth is None or (self.log.imported and not np.any(truth.omega_bn_b)):
+        if truth is None or not self.log.knows("rate"):
             return None
         time = self.log.time(truth)
         return _mean_deg(self.log.rate[time > time[-1] - FINAL_TIME + 0.01 * self.log.period])
@@ -201,14 +201,14 @@ class EstimatorMeasures:
 
     def heading_error_eclipse_deg(self) -> float | None:
         """Mean heading error in eclipse."""
-        if self._headings is None or not self.flight.knows_arrays:
+        if self._headings is None or not self._log.knows("illumination"):
             return None
         steps, errors = self._headings
         return _mean_deg(errors[~self._log.sunlit[steps]])
 
     def heading_error_dawn_deg(self) -> float | None:
         """Mean heading error in the first minute after an eclipse."""
-        if self._headings is None or not self.flight.knows_arrays or self._log.period == 0.0:
+        if self._headings is None or not self._log.knows("illumination") or self._log.period == 0.0:
             return None
         steps, errors = self._headings
         return _mean_deg(errors[dawn_steps(self._log.sunlit, self._log.period)[steps]])
@@ -250,7 +250,7 @@ class EstimatorMeasures:
     def _settled(self) -> tuple[np.ndarray, np.ndarray]:
         """Errors [rad] and normalised errors squared from `Windows.settled_time` on."""
         truth = self._log.truth
-        if truth is None or self.name not in self._log.attitudes:
+        if truth is None or self.name not in self._log.attitudes or not self._log.knows("attitude"):
             return _NONE, _NONE
         steps, errors, squared = attitude_errors(self._log, self.name)
         settled = self._log.time(truth)[steps] >= self.flight.windows.settled_time - 0.01 * self._log.period

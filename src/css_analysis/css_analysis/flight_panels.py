@@ -136,7 +136,7 @@ def _body_rate(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     for (name, columns), colour in zip(estimates.items(), colours(len(estimates)), strict=True):
         rate = np.degrees(np.linalg.norm(columns.omega_bn_b, axis=1))
         draw_series(axes, log.time(columns) / unit.scale, rate, colour, f"estimated by {name}")
-    if log.truth is not None:
+    if log.knows("rate"):
         draw_true_rate(axes, log, unit, BLACK, "true")
     finish_rate(axes)
 
@@ -204,9 +204,9 @@ def panels_of(log: FlightLog) -> list[Panel]:
     has_truth, has_estimates = log.truth is not None, bool(log.estimates)
     chosen = {
         _HEADING_ERROR: has_truth and has_estimates,
-        _ATTITUDE_ERROR: has_truth and bool(log.attitudes),
-        _POINTING_ERROR: has_truth,
-        _BODY_RATE: has_truth or has_estimates or bool(log.attitudes),
+        _ATTITUDE_ERROR: log.knows("attitude") and bool(log.attitudes),
+        _POINTING_ERROR: has_truth and not log.imported,
+        _BODY_RATE: log.knows("rate") or has_estimates or bool(log.attitudes),
         _CONTROL_MODE: log.control is not None,
         _WHEEL_SPEED: log.wheels is not None,
         _CELL_OUTPUT: log.voltages is not None,

@@ -3,7 +3,7 @@
 
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -50,6 +50,14 @@ def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: C
             os.environ.update({name: value for name, value in before.items() if value is not None})
 
 
+Ends = Callable[[ComposedFlight], str]
+"""Why a flight is to end early, asked now and then; empty: it goes on."""
+
+
+def _goes_on(flight: ComposedFlight) -> str:
+    return ""
+
+
 def fly(
     mission: Mission,
     bag: Path | None,
@@ -57,6 +65,7 @@ def fly(
     processes: bool,
     console: Console,
     overwrite: bool = False,
+    ends: Ends = _goes_on,
     stand_ins: Mapping[str, type[Component]] | None = None,
 ) -> FlightResult:
     """Flies a mission to its end, or until Ctrl-C or SIGTERM, after which the recording is complete up to there.
@@ -67,6 +76,7 @@ def fly(
         processes: one process per node instead of one for all.
         console: where progress is shown, when it is a terminal.
         overwrite: replace a recording that is there.
+        ends: why it ends early, in one process.
         stand_ins: components in the place of those of some nodes, by name; of a flight in one process.
 
     Raises:
@@ -79,7 +89,7 @@ def fly(
         if processes:
             result = _fly_processes(mission, bag, console, stop, overwrite)
         else:
-            result = _fly_composed(mission, bag, console, stop, overwrite, stand_ins or {})
+            result = _fly_composed(mission, bag, console, stop, overwrite, ends, stand_ins or {})
     result.warnings = warnings
     return result
 
@@ -109,25 +119,42 @@ def _fly_composed(
     console: Console,
     stop: StopSignal,
     overwrite: bool,
+    ends: Ends,
     stand_ins: Mapping[str, type[Component]],
 ) -> FlightResult:
     with ComposedFlight(mission, bag, overwrite=overwrite, stand_ins=stand_ins) as flight:
-        total = mission.values.mission.duration
-        if not _live(console):
-            lines = ProgressLines(f"flying {mission.name}", "s simulated")
-            return flight.fly(lambda seconds: lines.tell(seconds, total), lambda: stop.came)
-        bar = Progress(
-            TextColumn(f"flying {escape(mission.name)}"),
-            BarColumn(),
-            TextColumn("{task.completed:.0f} of {task.total:.0f} s simulated"),
-            TimeElapsedColumn(),
-            TimeRemainingColumn(),
-            console=console,
-            transient=True,
-        )
-        with bar:
-            task = bar.add_task("", total=total)
-            return flight.fly(lambda seconds: bar.update(task, completed=seconds), lambda: stop.came)
+        reason = ""
+
+        def over() -> bool:
+            nonlocal reason
+            reason = reason or ends(flight)
+            return stop.came or bool(reason)
+
+        result = _with_progress(mission, flight, console, over)
+    if reason:
+        result.failure, result.interrupted = result.failure or reason, False
+    return result
+
+
+def _with_progress(
+    mission: Mission, flight: ComposedFlight, console: Console, stopped: Callable[[], bool]
+) -> FlightResult:
+    total = mission.values.mission.duration
+    if not _live(console):
+        lines = ProgressLines(f"flying {mission.name}", "s simulated")
+        return flight.fly(lambda seconds: lines.tell(seconds, total), stopped)
+    bar = Progress(
+        TextColumn(f"flying {escape(mission.name)}"),
+        BarColumn(),
+        TextColumn("{task.completed:.0f} of {task.total:.0f} s simulated"),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+        console=console,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task("", total=total)
+        return flight.fly(lambda seconds: bar.update(task, completed=seconds), stopped)
 
 
 def _live(console: Console) -> bool:

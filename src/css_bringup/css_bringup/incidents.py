@@ -3,10 +3,11 @@
 
 from collections.abc import Iterator, Mapping
 
-from css_common.host import REJECTED, STRANGER
+from css_common.edge import REJECTED, STRANGER
 from css_common.mission import Mission
+from css_drivers import hil_exchange
 
-Counters = Mapping[str, int]
+Counters = Mapping[str, int | float]
 
 _OF_ANY_NODE = {
     "cycle_failed": "{} cycles failed and gave no output",
@@ -16,6 +17,11 @@ _OF_ANY_NODE = {
     "time_set_back": "began anew {} times because time was set back",
     "skipped": "{} cycles that there were not, because a message that they need did not come",
     "unmatched": "{} messages that no cycle used, because what belongs to them did not come",
+    hil_exchange.LOST: "{} frames that the board did not answer in time; its actuators had the safe command",
+    hil_exchange.DOWN: "{} cycles without a link to the board",
+    hil_exchange.LATE: "{} answers of the board that came after their cycle",
+    hil_exchange.CORRUPT: "{} frames of the board that were damaged",
+    hil_exchange.WRONG: "{} frames of the board that answer nothing that was asked, or for other actuators",
 }
 _OF_THE_PLANT = {
     "cycle_failed": _OF_ANY_NODE["cycle_failed"],

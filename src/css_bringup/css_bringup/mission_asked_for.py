@@ -4,7 +4,8 @@
 import argparse
 
 from css_analysis.quantities import QUANTITIES
-from css_bringup.options import complain
+from css_bringup.options import complain, errors
+from css_common.drawn_mission import drawn
 from css_common.mission import SHARED, Mission, load_mission
 from css_common.mission_file import MissionError
 from css_common.schema import unknown_name
@@ -28,4 +29,7 @@ def mission_of(arguments: argparse.Namespace) -> Mission:
             raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
     for remark in mission.remarks:
         complain("warning:", remark)
-    return mission
+    flies = drawn(mission)
+    for line in flies.lines():
+        errors.print(f"drawn for case {mission.values.mission.case}: {line}", soft_wrap=True)
+    return flies.mission

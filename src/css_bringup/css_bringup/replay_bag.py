@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from css_analysis.estimator_runs import Run, estimator_runs
-from css_analysis.flight_log import IMPORTED_FROM, FlightLog, read_flight
+from css_analysis.flight_log import FlightLog, read_flight
 from css_bringup.estimator_request import EstimatorRequest
 from css_bringup.replay_pass import Replay
 from css_bringup.replay_verdict import shortcomings, software_apart
@@ -19,7 +19,7 @@ from css_common.mission import Mission, MissionError, load_mission, mission_from
 from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
-from css_recording.provenance import software_versions
+from css_recording.provenance import IMPORTED_FROM, software_versions
 
 
 @dataclass

@@ -6,6 +6,7 @@ the rest: lifecycle, parameter declaration, stamp matching, message checks, diag
 same component without a node, which is why a replayed estimator gives the bytes that flew.
 """
 
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
@@ -54,6 +55,10 @@ class Input:
         heeded: False while the values make nothing of it (a gyro that is not to be used): its messages are then
             neither waited for nor handed over, whatever they are. May change when values do.
         switch: parameter that says so, for those who wait in vain for a message.
+        once: a message is a measurement that counts once: among devices with clocks of their own the next cycle is not
+            given it again.
+        restamped: messages bear the time of their arrival, whatever stamp they come with.
+        sensor_frame: the frame_id that is expected in the place of that of `frame`; empty: that.
     """
 
     key: str
@@ -68,6 +73,9 @@ class Input:
     readings: Mapping[str, Readings] = field(default_factory=dict)
     heeded: bool = True
     switch: str = ""
+    once: bool = False
+    restamped: bool = False
+    sensor_frame: str = ""
 
     @property
     def may_be_silent(self) -> bool:
@@ -87,6 +95,7 @@ class Output:
         divider: published every `divider` steps.
         ends_cycle: in lockstep the plant waits for it before it advances (estimates and commands).
         events: any number of messages a step, stamped when they happened; nothing can wait for them or match them.
+        may_lack: array fields of which elements may be missing (NaN).
     """
 
     key: str
@@ -96,6 +105,7 @@ class Output:
     divider: int = 1
     ends_cycle: bool = False
     events: bool = False
+    may_lack: tuple[str, ...] = ()
 
 
 class Finding(NamedTuple):
@@ -108,6 +118,14 @@ class Finding(NamedTuple):
 
     text: str
     refused: bool = False
+
+
+class Standing(NamedTuple):
+    """How a component is beyond what its host sees: what it has counted and measured of a device, for diagnostics."""
+
+    warning: str = ""  # what is not as it should be, in one line
+    failing: bool = False  # nothing useful comes of it now
+    figures: Mapping[str, int | float] = {}
 
 
 class Smoothing(NamedTuple):
@@ -157,17 +175,20 @@ class Component:
 
     Attributes:
         report: takes a line for the log; a host makes it the node's.
+        now_ns: time of the clock that stamps are of [ns]; a host makes it the node's.
         left_out: names of the units that it holds for failed, such as `cell.3`.
 
     Class attributes:
         shared: mission sections whose values the component reads (`shared_sections`), besides mission and io.
         parameters: its own parameters.
         fault_kinds: what its units may do wrong (`fault_lines`); it then has the parameter `faults`.
+        rehearses: a stand-in may be cycled before the flight; not of what reaches out of the process.
     """
 
     shared: ClassVar[tuple[str, ...]] = ()
     parameters: ClassVar[Table] = ()
     fault_kinds: ClassVar[tuple[FaultKind, ...]] = ()
+    rehearses: ClassVar[bool] = True
     _read_by_host: ClassVar[tuple[str, ...]] = ("mission", "io")
     _needed_by_host: ClassVar[tuple[str, ...]] = ()
 
@@ -175,6 +196,7 @@ class Component:
         self.name = name
         self.values = values
         self.report: Callable[[str], object] = _unheard
+        self.now_ns: Callable[[], int] = time.time_ns
         self.left_out: tuple[str, ...] = ()
         self.period_ns = round(values.mission.period * 1e9)
         self.epoch_ns = mission_epoch(values.mission)
@@ -249,8 +271,15 @@ class Component:
         """How an estimator with these values lags behind what it measures, for those who close a loop around it."""
         return Smoothing()
 
+    def standing(self) -> Standing:
+        """What its host cannot know of how it is."""
+        return Standing()
+
     def configure(self) -> None:
         """Builds algorithm parameters and the initial state from `self.values`."""
+
+    def release(self) -> None:
+        """Gives up what it holds outside of the process: the node is done with it."""
 
     def tune(self, values: Values) -> None:
         """Takes new values of tunable parameters in flight; the state stays."""

@@ -19,14 +19,14 @@ class Health(NamedTuple):
     Attributes:
         level: `DiagnosticStatus.OK`, `WARN` or `ERROR`.
         message: one line.
-        counters: what it has counted since its start.
+        counters: what it has counted since its start, and what its component measures of a device.
         stamp_ns: simulated time of its last cycle [ns since 1970 UTC].
         left_out: names of the units that it holds for failed.
     """
 
     level: bytes
     message: str
-    counters: Mapping[str, int]
+    counters: Mapping[str, int | float]
     stamp_ns: int
     left_out: tuple[str, ...] = ()
 

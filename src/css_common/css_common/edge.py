@@ -4,6 +4,7 @@
 Shared by live nodes and replay. Rejections are counted by kind; the first of each kind is reported.
 """
 
+import time
 from collections import Counter
 from collections.abc import Callable, Sequence
 
@@ -22,6 +23,11 @@ HISTORY = 100
 
 ANSWERED_AGAIN = "answered_again"
 """A restarted sender repeats what its predecessor sent: left out, but no fault."""
+
+REJECTED = ".rejected."
+"""Between an input and the kind of refusal, in the names of counters."""
+STRANGER = ".stranger."
+"""Between a topic and the node that wrote it besides the one that is heard, in the names of counters."""
 
 _CONFIRMATIONS = 3
 CONFIRMATIONS_BACK = 10
@@ -95,12 +101,13 @@ class Edge:
             report: called with one line at the first rejection of each kind.
         """
         self.source = source
+        self.now_ns: Callable[[], int] = time.time_ns
         self.codec = codec_of(source.message_type)
         self.accepted = 0
         self.repeated = 0
         self.rejected: Counter[str] = Counter()
         io = values.io
-        expected = io.inertial_frame if source.frame == INERTIAL else io.body_frame
+        expected = source.sensor_frame or (io.inertial_frame if source.frame == INERTIAL else io.body_frame)
         self.frames = frozenset((expected, *io.accepted_frames))
         self.expected_frame = expected
         # a message that is due less often than that must not count as one from another time
@@ -125,6 +132,8 @@ class Edge:
             return None
         if sample.frame_id == GAP:
             return sample
+        if self.source.restamped:
+            sample.stamp_ns = self.now_ns()
         refusal = self._refusal(sample)
         if refusal is not None:
             self._incomplete.clear()

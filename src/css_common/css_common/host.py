@@ -27,9 +27,9 @@ from rclpy.timer import Timer
 
 from css_common import process_faults, ros_parameters
 from css_common.codec import Sample, codec_of
-from css_common.component import Component, Outgoing, Output, Plant
+from css_common.component import Component, Outgoing, Output, Plant, Standing
 from css_common.diagnostics import Diagnostics, Health
-from css_common.edge import Edge
+from css_common.edge import REJECTED, STRANGER, Edge
 from css_common.fault_services import FaultServices
 from css_common.link_kinds import LINK_FAULTS
 from css_common.matching import Matcher
@@ -43,11 +43,6 @@ from css_common.sole_subscription import SoleSubscription
 from css_common.stepping import Stepper, conflict
 from css_common.supervised import announced_before
 from css_common.writers import writer_choice
-
-REJECTED = ".rejected."
-"""Between an input and the kind of refusal, in the names of counters."""
-STRANGER = ".stranger."
-"""Between a topic and the node that wrote it besides the one that is heard, in the names of counters."""
 
 _SUCCESS = TransitionCallbackReturn.SUCCESS
 _FAILURE = TransitionCallbackReturn.FAILURE
@@ -216,9 +211,11 @@ class ComponentNode(LifecycleNode):
         self.stepper = self._stepper(name)
         self.component = self.stepper.component
         self.component.report = self.get_logger().info
+        self.component.now_ns = lambda: self.get_clock().now().nanoseconds
         values = self.component.values
         inputs = self.component_type.inputs(name, values)
-        rehearse(self.component_type, name, values)
+        if self.component_type.rehearses:
+            rehearse(self.component_type, name, values)
         published = self.mission.topics
         awaited = [i.key for i in inputs if i.required or i.topic in published]
         self.matcher = Matcher(self.component, inputs, awaited)
@@ -228,6 +225,7 @@ class ComponentNode(LifecycleNode):
                 self._output_ports[output.key] = self._create_output(output)
         for source in inputs:
             edge = Edge(source, values, self.get_logger().warning)
+            edge.now_ns = self.component.now_ns
             self.edges[source.key] = edge
             receive = partial(self._receive, source.key, edge)
             with endpoint(source.topic):
@@ -295,6 +293,8 @@ class ComponentNode(LifecycleNode):
             self._deadline_timer = None
         self._output_ports.clear()
         self.edges.clear()
+        if self.component is not None:
+            self.component.release()
         self.component = self.stepper = self.matcher = None  # type: ignore[assignment]
         self._overdue_stamp = self._unanswered = None
         self._forgiven = Counter(self.counters)
@@ -308,6 +308,8 @@ class ComponentNode(LifecycleNode):
 
     def destroy_node(self) -> None:
         """Destroys the node now; rclpy alone would leave it, and its name, to the garbage collector."""
+        if self.component is not None:
+            self.component.release()
         super().destroy_node()
         self._state_machine.destroy_when_not_in_use()
 
@@ -467,7 +469,7 @@ class ComponentNode(LifecycleNode):
 
     def health(self) -> Health:
         """Level, one line and counters for /diagnostics."""
-        counters = dict(self.counters)
+        counters: dict[str, int | float] = dict(self.counters)
         for key, edge in self.edges.items():
             counters[f"{key}.accepted"] = edge.accepted
             if edge.repeated:
@@ -485,6 +487,10 @@ class ComponentNode(LifecycleNode):
             if self.stepper.skipped:
                 counters["skipped"] = self.stepper.skipped
         level, message = self._own_state()
+        standing = Standing() if self.component is None else self.component.standing()
+        counters.update(standing.figures)
+        if standing.warning and level != DiagnosticStatus.ERROR:
+            level, message = DiagnosticStatus.ERROR if standing.failing else DiagnosticStatus.WARN, standing.warning
         left_out = () if self.component is None else self.component.left_out
         if left_out and level == DiagnosticStatus.OK:
             level, message = DiagnosticStatus.WARN, f"held for failed: {', '.join(left_out)}"

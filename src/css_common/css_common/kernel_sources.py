@@ -23,6 +23,7 @@ KERNEL_PACKAGES = (
     "css_analysis",
     "css_monte_carlo",
     "css_papers",
+    "css_design",
 )
 _CALLED_BY_TYPE = KERNEL_PACKAGES[:6]  # nothing calls upwards
 

@@ -235,6 +235,10 @@ class Matcher:
         self._done = stamp
         return stamp, {key: slots.get(key) for key in self.inputs}
 
+    def _longest_age(self, source: Input) -> int:
+        """Age [ns] beyond which a message counts as silent: what comes less often may be older by what it waits."""
+        return self.deadline_ns + (source.divider - 1) * self._component.period_ns
+
     def _offer_gap(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         """Takes the word for it that no message of a stamp comes, if none has."""
         stamp = sample.stamp_ns
@@ -258,11 +262,13 @@ class Matcher:
         received = {}
         for name, entry in self.inputs.items():
             held = self._latest.get(name)
-            fresh = held is not None and abs(stamp - held.stamp_ns) <= self.deadline_ns
+            fresh = held is not None and abs(stamp - held.stamp_ns) <= self._longest_age(entry)
             if not fresh and not entry.may_be_silent:
                 self.unmatched += 1
                 _note(self._missed, entry.topic, stamp)
                 return []
             received[name] = held if fresh else None
+            if fresh and entry.once:
+                del self._latest[name]
         self._done = stamp
         return [(stamp, received)]

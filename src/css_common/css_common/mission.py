@@ -15,8 +15,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from css_common import dispersions
 from css_common.codec import type_name
 from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
+from css_common.dispersions import Dispersion, dispersions_of, text_parameter
 from css_common.epochs import mission_epoch
 from css_common.fault_lines import FAULTS, SECTION, Host, entries_of, entry_parameter
 from css_common.link_kinds import KINDS as LINK_KINDS
@@ -32,6 +34,7 @@ from css_common.parameter_sections import (
     given_to,
     is_for,
     is_shared,
+    merged_files,
     shared_by_all,
     with_own,
     with_shared,
@@ -63,7 +66,7 @@ __all__ = [
     "mission_from_text",
 ]
 
-_SCRIPTS = ("events.", "criteria.", SECTION)
+_SCRIPTS = ("events.", "criteria.", SECTION, dispersions.SECTION)
 _OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
 _MOST_NODES = 64
 
@@ -102,6 +105,8 @@ class Mission:
 
     Attributes:
         faults: entries of the section `faults`; the parameters of their nodes have them, too.
+        dispersions: parameters that are drawn for each case; its values are those before the draws
+            (`css_common.drawn_mission`).
         remarks: what is right but may not be what was meant, one line each.
     """
 
@@ -148,6 +153,8 @@ class Mission:
                 _refuse(missing(known.values(), self.values, (EPOCH.name,)))  # from which times count
         self.criteria = criteria_of(_below("criteria.", given), f"{origin}: {SHARED}")
         self._check_wiring()
+        with _naming(origin, SHARED):
+            self.dispersions: tuple[Dispersion, ...] = dispersions_of(_below(dispersions.SECTION, given), self.known)
         self.remarks = tuple(self._unmeant())
 
     @property
@@ -264,11 +271,39 @@ class Mission:
                 raise MissionError(f"{shown(override)} is no override, expected KEY=VALUE")
             node, specification = self._find(key.strip())
             value = _parsed(key.strip(), specification, text)
-            if node is None:
-                parameters = with_shared(parameters, key.strip(), value)
-            else:
-                parameters = with_own(parameters, node, specification.name, value)
+            parameters = _placed(parameters, key.strip(), node, specification, value)
         return self._with(parameters)
+
+    def with_drawn(self, values: Mapping[str, Any], case: int) -> "Mission":
+        """The mission with values in canonical form by key, for a case; it disperses nothing any more.
+
+        Raises:
+            MissionError: values that do not go together.
+        """
+        parameters: Sections = self.parameters
+        for key, value in values.items():
+            parameters = _placed(parameters, key, *self._find(key), value)
+        parameters = with_shared(parameters, "mission.case", case)
+        drawn = dispersions.SECTION
+        return self._with({n: {k: v for k, v in p.items() if not k.startswith(drawn)} for n, p in parameters.items()})
+
+    def known(self, key: str) -> tuple[str | None, Parameter, Any]:
+        """Node of an override's key (None: it is shared), its specification and its value in canonical form.
+
+        Raises:
+            MissionError: no section has it.
+        """
+        node, specification = self._find(key)
+        canonical = self.shared if node is None else self.node(node).canonical
+        return node, specification, canonical.get(specification.name)
+
+    def with_sections(self, sections: Sections) -> "Mission":
+        """The mission with the parameters of a file on top of its own, key by key.
+
+        Raises:
+            MissionError: a section or key that the mission does not have, or a value that is refused.
+        """
+        return self._with(merged_files([self.parameters, sections]))
 
     def with_node(self, node: tuple[str, str, str], changes: Mapping[str, str]) -> "Mission":
         """The mission with a node in its graph, there or not, and texts of parameters of its own applied.
@@ -304,9 +339,9 @@ class Mission:
         shared = shared_parameters()
         if key in shared:
             return None, shared[key]
-        of_fault = entry_parameter(key, self._hosts().values())
-        if of_fault is not None:
-            return None, of_fault
+        other = entry_parameter(key, self._hosts().values()) or text_parameter(key)
+        if other is not None:
+            return None, other
         head, _, rest = key.partition(".")
         known = [*shared]
         for node in self.nodes:
@@ -440,6 +475,13 @@ def _parsed(key: str, specification: Parameter, text: str) -> Any:
         return replace(specification, name=key).parse(text)  # errors name it as it was typed
     except ParameterError as error:
         raise MissionError(f"override {error}") from error
+
+
+def _placed(sections: Sections, key: str, node: str | None, specification: Parameter, value: Any) -> Sections:
+    """Sections in which an override's key has a value."""
+    if node is None:
+        return with_shared(sections, key, value)
+    return with_own(sections, node, specification.name, value)
 
 
 @contextmanager

@@ -33,6 +33,18 @@ def sections_of_file(path: str | Path) -> dict[str, dict[str, Any]]:
     return _of_text(read_text(path), str(path), Path(path), ())
 
 
+def sections_alone(path: str | Path) -> dict[str, dict[str, Any]]:
+    """Flat parameters of each section of a parameter file, without those of a mission that it may extend.
+
+    Raises:
+        MissionError: the file is missing or no parameter file.
+    """
+    sections = {name: flattened(body) for name, body in read_sections(read_text(path), str(path)).items()}
+    for parameters in sections.values():
+        parameters.pop(EXTENDS, None)
+    return sections
+
+
 def sections_of_text(text: str, origin: str) -> dict[str, dict[str, Any]]:
     """The same for a text that is no file, which can extend missions by name.
 

@@ -13,6 +13,8 @@ from rclpy.signals import SignalHandlerOptions
 
 from css_common.command import FAILED, USAGE, complain
 from css_common.component import Component, Plant
+from css_common.device import Device
+from css_common.device_host import DeviceNode
 from css_common.executor import create_executor, spin_until
 from css_common.host import ComponentNode
 from css_common.mission import Mission
@@ -44,7 +46,11 @@ def main(component_type: type[Component], arguments: list[str]) -> int:
 
 def create_node(component_type: type[Component], name: str, mission: Mission, **options) -> ComponentNode:
     """The host that fits a component."""
-    host = PlantNode if issubclass(component_type, Plant) else ComponentNode
+    host: type[ComponentNode] = ComponentNode
+    if issubclass(component_type, Plant):
+        host = PlantNode
+    elif issubclass(component_type, Device):
+        host = DeviceNode
     return host(component_type, name, mission, **options)
 
 

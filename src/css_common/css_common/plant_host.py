@@ -102,9 +102,6 @@ class PlantNode(ComponentNode):
         # A step in which nobody is waited for goes on by a timer: the executor must get to partners that come back.
         self._go_on_timer = self.create_timer(1e-4, self._go_on, clock=self._steady)
         self._go_on_timer.cancel()
-        if lockstep.realtime_factor > 0.0:
-            period = max(self.component.period_ns * 1e-9 / lockstep.realtime_factor, 1e-4)
-            self._pace_timer = self.create_timer(period, self._on_pace, clock=self._steady)
 
     def _activate(self) -> None:
         # no fresh state here: a plant that was deactivated has paused, and time goes on where it stood
@@ -313,10 +310,18 @@ class PlantNode(ComponentNode):
             return
         if self.component.finished:
             self.done = True
-        elif self._pace_timer is None:
+        elif self.component.values.lockstep.realtime_factor == 0.0:
             self._go_to(stamp_ns + self.component.period_ns, outgoing)
         else:
             self._held_back = outgoing
+            self._begin_to_pace()
+
+    def _begin_to_pace(self) -> None:
+        """Has the wall clock hold time back from the first answer on: until then partners are still starting."""
+        if self._pace_timer is None:
+            factor = self.component.values.lockstep.realtime_factor
+            period = max(self.component.period_ns * 1e-9 / factor, 1e-4)
+            self._pace_timer = self.create_timer(period, self._on_pace, clock=self._steady)
 
     def _on_pace(self) -> None:
         if not self._is_active or self.done:

@@ -47,6 +47,7 @@ class Stream(IntEnum):
     FAULT = 26
     LINK_FAULT = 27
     HEAD_FAULT = 28
+    DISPERSION = 29
 
 
 class RandomKey(NamedTuple):

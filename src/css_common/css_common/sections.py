@@ -16,7 +16,7 @@ from css_common.codec import MAX_FRAME
 from css_common.earth import EARTH_RADIUS
 from css_common.epochs import parse_utc
 from css_common.link_kinds import LINK_FAULTS
-from css_common.schema import Table, Values, choice, flag, integer, real, reals, shown, text, texts
+from css_common.schema import Parameter, Table, Values, choice, flag, integer, real, reals, shown, text, texts
 from css_common.section import Section, unit_rows
 
 _LAST_STAMP_NS = 2**31 * 1_000_000_000
@@ -41,7 +41,7 @@ DURATION = real(
     "simulated time to fly",
     low=0.0,
     open_low=True,
-    high=3.2e7,
+    high=3.2e8,
     example="mission: {duration: 5550.0}",
 )
 PERIOD = real("mission.period", 0.1, "s", "control cycle", low=0.001, high=60.0)
@@ -183,31 +183,72 @@ WHEEL_MAX_SPEED = real(
     "wheels.max_speed_rpm", None, "rpm", "speed limit of each wheel", low=0.0, example="wheels: {max_speed_rpm: 6000.0}"
 )
 
+WHEEL_INERTIAS = reals(
+    "wheels.inertias", (), "kg m^2", "spin inertia of each wheel; empty: wheels.inertia for all", low=1e-12
+)
+WHEEL_MAX_TORQUES = reals(
+    "wheels.max_torques", (), "N m", "torque limit of each wheel; empty: wheels.max_torque for all", low=0.0
+)
+WHEEL_MAX_SPEEDS = reals(
+    "wheels.max_speeds_rpm",
+    (),
+    "rpm",
+    "speed limit of each wheel (its largest momentum over its inertia); empty: wheels.max_speed_rpm for all",
+    low=0.0,
+)
+
 WHEELS: Table = (
     WHEELS_FITTED,
     WHEEL_AXES,
     WHEEL_INERTIA,
     WHEEL_MAX_TORQUE,
     WHEEL_MAX_SPEED,
+    WHEEL_INERTIAS,
+    WHEEL_MAX_TORQUES,
+    WHEEL_MAX_SPEEDS,
 )
+_EACH: dict[Parameter[float], Parameter[np.ndarray]] = {
+    WHEEL_INERTIA: WHEEL_INERTIAS,
+    WHEEL_MAX_TORQUE: WHEEL_MAX_TORQUES,
+    WHEEL_MAX_SPEED: WHEEL_MAX_SPEEDS,
+}
 
 RODS_FITTED = flag("rods.fitted", False, "the spacecraft carries magnetic torque rods")
 ROD_AXES = reals(
     "rods.axes", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), "-", "rod axes in b, a row each", columns=3
 )
 ROD_MAX_DIPOLE = real("rods.max_dipole", 20.0, "A m^2", "dipole limit of each rod", low=0.0)
+ROD_MAX_DIPOLES = reals(
+    "rods.max_dipoles", (), "A m^2", "dipole limit of each rod; empty: rods.max_dipole for all", low=0.0
+)
 
 RODS: Table = (
     RODS_FITTED,
     ROD_AXES,
     ROD_MAX_DIPOLE,
+    ROD_MAX_DIPOLES,
 )
 
 FIELD_DIVIDER = integer(
     "magnetometer.divider", 1, "steps", "a measurement is due every so many steps", low=1, high=100000
 )
 
-MAGNETOMETER: Table = (FIELD_DIVIDER,)
+MEASURED_FIELD_BIAS = reals(
+    "magnetometer.measured.bias_nt", (), "nT", "bias of the magnetometer, as calibrated; empty: none", columns=3
+)
+MEASURED_FIELD_MATRIX = reals(
+    "magnetometer.measured.matrix",
+    (),
+    "-",
+    "what the magnetometer makes of a field besides its bias, as calibrated, row-major; empty: the field itself",
+    columns=3,
+)
+MEASURED_GYRO_BIAS = reals(
+    "gyro.measured.bias_deg_h", (), "deg/h", "bias of the gyro, as calibrated; empty: none", columns=3
+)
+
+MAGNETOMETER: Table = (FIELD_DIVIDER, MEASURED_FIELD_BIAS, MEASURED_FIELD_MATRIX)
+GYRO: Table = (MEASURED_GYRO_BIAS,)
 
 MEASURES: Table = (
     real(
@@ -242,6 +283,23 @@ MEASURES: Table = (
         "share of the cases of a study that must meet the criteria; 0: criteria judge flights alone",
         low=0.0,
         high=1.0,
+    ),
+)
+
+SAMPLING: Table = (
+    choice(
+        "sampling.method",
+        "random",
+        ("random", "lhs", "sobol", "saltelli"),
+        "how dispersed parameters are drawn over the cases of a study",
+    ),
+    integer(
+        "sampling.cases",
+        0,
+        "-",
+        "cases that a Latin hypercube is spread over, or base points of a Saltelli design",
+        low=0,
+        high=2**24,
     ),
 )
 
@@ -314,12 +372,12 @@ def needed_of_wheels(values: Values) -> tuple[str, ...]:
     """What a component cannot do without that turns the wheels, if there are any."""
     if not values[WHEELS_FITTED]:
         return ()
-    return tuple(p.name for p in (WHEEL_AXES, WHEEL_INERTIA, WHEEL_MAX_TORQUE, WHEEL_MAX_SPEED))
+    return (WHEEL_AXES.name, *(of_all.name for of_all, each in _EACH.items() if not len(values[each])))
 
 
 def needed_of_wheel_momentum(values: Values) -> tuple[str, ...]:
     """What a component cannot do without that counts the momentum of the wheels that there are."""
-    return (WHEEL_INERTIA.name,) if len(wheel_axes(values)) else ()
+    return (WHEEL_INERTIA.name,) if len(wheel_axes(values)) and not len(values[WHEEL_INERTIAS]) else ()
 
 
 def wheel_axes(values: Values) -> np.ndarray:
@@ -327,10 +385,29 @@ def wheel_axes(values: Values) -> np.ndarray:
     return values[WHEEL_AXES] if values[WHEELS_FITTED] else np.zeros((0, 3))
 
 
+def of_each_wheel(values: Values, of_all: Parameter[float]) -> np.ndarray:
+    """Inertia [kg m^2], largest torque [N m] or speed [rpm] of each wheel (N,); NaN where nobody has said.
+
+    Args:
+        of_all: WHEEL_INERTIA, WHEEL_MAX_TORQUE or WHEEL_MAX_SPEED.
+    """
+    each = values[_EACH[of_all]]
+    return np.array(each) if len(each) else np.full(len(values[WHEEL_AXES]), values[of_all])
+
+
+def rod_max_dipoles(values: Values) -> np.ndarray:
+    """Largest dipole (M,) of each rod [A m^2]."""
+    each = values[ROD_MAX_DIPOLES]
+    return np.array(each) if len(each) else np.full(len(values[ROD_AXES]), values[ROD_MAX_DIPOLE])
+
+
 def _wheels_conflicts(wheels: Values) -> Iterator[str]:
     if not len(wheels.axes):
         return
     yield from unit_rows("wheels.axes", wheels.axes, 3, 32)
+    for key in ("inertias", "max_torques", "max_speeds_rpm"):
+        if len(getattr(wheels, key)) not in (0, len(wheels.axes)):
+            yield f"wheels.{key}: {len(getattr(wheels, key))} given, expected one for each of {len(wheels.axes)} wheels"
     rank = np.linalg.matrix_rank(wheels.axes) if wheels.axes.size else 0
     if rank < 3:
         yield f"wheels.axes: they span {rank} of 3 directions, expected axes that span all"
@@ -338,6 +415,25 @@ def _wheels_conflicts(wheels: Values) -> Iterator[str]:
 
 def _rods_conflicts(rods: Values) -> Iterator[str]:
     yield from unit_rows("rods.axes", rods.axes, 1, 32)
+    if len(rods.max_dipoles) not in (0, len(rods.axes)):
+        yield f"rods.max_dipoles: {len(rods.max_dipoles)} given, expected one for each of {len(rods.axes)} rods"
+
+
+def _magnetometer_conflicts(magnetometer: Values) -> Iterator[str]:
+    measured = magnetometer.measured
+    if len(measured.bias_nt) not in (0, 1):
+        yield f"magnetometer.measured.bias_nt: {3 * len(measured.bias_nt)} numbers given, expected three or none"
+    if not len(measured.matrix):
+        return
+    if len(measured.matrix) != 3:
+        yield f"magnetometer.measured.matrix: {3 * len(measured.matrix)} numbers given, expected nine or none"
+    elif abs(np.linalg.det(measured.matrix)) < 1e-3:
+        yield "magnetometer.measured.matrix: singular, expected one near the identity"
+
+
+def _gyro_conflicts(gyro: Values) -> Iterator[str]:
+    if len(gyro.measured.bias_deg_h) not in (0, 1):
+        yield f"gyro.measured.bias_deg_h: {3 * len(gyro.measured.bias_deg_h)} numbers given, expected three or none"
 
 
 def _io_conflicts(io: Values) -> Iterator[str]:
@@ -425,8 +521,10 @@ SECTIONS: dict[str, Section] = {
     "spacecraft": Section(SPACECRAFT, _spacecraft_conflicts),
     "wheels": Section(WHEELS, _wheels_conflicts),
     "rods": Section(RODS, _rods_conflicts),
-    "magnetometer": Section(MAGNETOMETER),
+    "magnetometer": Section(MAGNETOMETER, _magnetometer_conflicts),
+    "gyro": Section(GYRO, _gyro_conflicts),
     "measures": Section(MEASURES),
+    "sampling": Section(SAMPLING),
     "graph": Section(GRAPH),
     "lockstep": Section(LOCKSTEP),
     "io": Section(IO, _io_conflicts),

@@ -34,4 +34,5 @@ def field_input(values: Values, *, required: bool = False) -> Input:
         required=required,
         divider=values.magnetometer.divider,
         used=("magnetic_field",),
+        once=not required,
     )

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.codec import Codec, Sample, codec_of
-from css_common.component import Component, Cycles, Outgoing, Received, all_conflicts
+from css_common.component import Component, Cycles, Outgoing, Output, Received, all_conflicts
 from css_common.link import GAP, Link, gap
 from css_common.message_columns import unstack
 from css_common.mission import Event
@@ -49,8 +49,12 @@ class Port(NamedTuple):
     key: str
     topic: str
     codec: Codec
-    real_fields: list
+    real_fields: list  # those that must be finite
     events: bool  # as of `Output`
+
+
+def _finite_fields(codec: Codec, output: Output) -> list:
+    return [field for field in codec.real_fields() if field.name not in output.may_lack]
 
 
 def _is_gap(given: Any) -> bool:
@@ -98,7 +102,7 @@ class Stepper:
         self.canonical = dict(canonical)
         self.component = component_type(name, shaped_values(component_type.table(), self.canonical))
         self.ports = {
-            output.key: Port(output.key, output.topic, codec, codec.real_fields(), output.events)
+            output.key: Port(output.key, output.topic, codec, _finite_fields(codec, output), output.events)
             for output in component_type.all_outputs(name, self.component.values)
             for codec in (codec_of(output.message_type),)
         }

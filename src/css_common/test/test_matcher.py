@@ -3,6 +3,7 @@
 
 import itertools
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -265,6 +266,20 @@ def test_latest_does_not_cycle_on_stale_required_inputs():
 def test_latest_gives_none_for_stale_optional_inputs():
     matcher = matcher_of((entry("a"), entry("g", required=False)), **LATEST)
     assert offered(matcher, ("a", 0), ("g", 0.5), ("a", 1), ("a", 7)) == [(0, "a"), (1, "ag"), (7, "a")]
+
+
+def test_latest_gives_a_measurement_that_counts_once_to_one_cycle_alone():
+    measured = replace(entry("m", required=False), once=True)
+    matcher = matcher_of((entry("a"), measured, entry("g", required=False)), **LATEST)
+    given = offered(matcher, ("m", 0), ("g", 0), ("a", 0.1), ("a", 1.1), ("m", 1.5), ("m", 1.6), ("a", 2.1))
+    assert given == [(0.1, "agm"), (1.1, "ag"), (2.1, "agm")]
+    assert matcher.unmatched == 0
+
+
+def test_latest_lets_what_comes_less_often_be_older():
+    matcher = matcher_of((entry("a"), entry("m", required=False, divider=10)), **LATEST)
+    # a deadline of 5 steps, and nine more for which the next one is not due
+    assert offered(matcher, ("m", 0), ("a", 13.9), ("a", 14.1)) == [(13.9, "am"), (14.1, "a")]
 
 
 def test_latest_takes_inputs_that_are_a_little_ahead():

@@ -390,6 +390,17 @@ def test_in_real_time_steps_keep_their_pace(bench, mission):
     assert commands(plant) == [float(k) for k in range(50)]
 
 
+def test_in_real_time_the_first_answer_is_never_late(bench, mission):
+    # partners that are still starting take their time; a period here is a thousandth of a second
+    held = Held(bench, mission, "lockstep.realtime_factor=100")
+    fired = []
+    timer = bench.node.create_timer(0.001, lambda: fired.append(1))
+    bench.until(lambda: len(fired) >= 20, "twenty periods pass")
+    bench.node.destroy_timer(timer)
+    assert held.plant.counters["deadline_missed"] == 0
+    held.fly_to(2)
+
+
 def test_in_real_time_late_answers_are_counted(bench, mission):
     held = Held(bench, mission, "lockstep.realtime_factor=100")
     held.fly_to(2)

@@ -26,8 +26,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.direction_grid import grid_cell
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, dot, multiply_transposed
+from css_common.vectors import Mat3, Vec3, dot, multiply, multiply_transposed, scale, unit
 from css_environment.earth_light import (
     DISC,
     DISC_COS,
@@ -55,17 +56,27 @@ _TERMS = 6 * PATCHES
 NARROWEST_SIN = 0.05
 
 
+_SAME_VIEW = np.zeros(0)
+_FREE_SKY = np.zeros(0, np.uint32)
+
+
 class Screen(NamedTuple):
-    """Structure that hides part of the sky from cells: all beyond an angle to an axis.
+    """What hides part of the sky from cells: structure beyond an angle to an axis, structure anywhere, narrow views.
 
     A cell whose `side` is positive receives all of the light from directions whose cosine to the axis is at least
     `full_cos`, none below `dark_cos`, a linear part between. If `side` is negative the axis is mirrored; if zero
     nothing is hidden.
+
+    `views` has the cosine of half the view of each cell (N,), where they are not all alike. `blocked` has for each cell
+    of the grid of `css_common.direction_grid` a mask of the cells that see nothing there; both are empty where there is
+    no such thing. A patch of the Earth's light is hidden when the middle of it is.
     """
 
     axis_b: Vec3  # unit vector, or zeros: no screen
     dark_cos: float
     full_cos: float
+    views: np.ndarray = _SAME_VIEW
+    blocked: np.ndarray = _FREE_SKY
 
 
 def plane_screen(normal_b) -> Screen:
@@ -85,6 +96,27 @@ def new_workspace() -> np.ndarray:
     return aligned_rows(7)
 
 
+def with_views(screen: Screen, views: np.ndarray, blocked: np.ndarray) -> Screen:
+    """The screen with the views of single cells and what is blocked from them; empty: as without."""
+    views = np.ascontiguousarray(views, dtype=np.float64) if len(views) else _SAME_VIEW
+    blocked = np.ascontiguousarray(blocked, dtype=np.uint32) if len(blocked) else _FREE_SKY
+    return screen._replace(views=views, blocked=blocked)
+
+
+@kernel
+def view_cosine(screen: Screen, i: int, of_all: float) -> float:
+    """Cosine of half the view of cell `i`, which is `of_all` where the views are alike."""
+    return screen.views[i] if screen.views.shape[0] > 0 else of_all
+
+
+@kernel
+def is_blocked(screen: Screen, i: int, direction_b: Vec3) -> bool:
+    """Whether structure is in front of cell `i` in a unit direction."""
+    if screen.blocked.shape[0] == 0:
+        return False
+    return (int(screen.blocked[grid_cell(direction_b)]) >> i) & 1 != 0
+
+
 @kernel
 def transmission(screen: Screen, side: float, direction_b: Vec3) -> float:
     """Part of the light of a point source that a screen lets pass to a cell of the given side, 0 to 1."""
@@ -99,6 +131,36 @@ def transmission(screen: Screen, side: float, direction_b: Vec3) -> float:
 
 
 @kernel
+def _output_of_one(light, normal_b: Vec3, side: float, i: int, screen: Screen, edge: float, dcm_bn: Mat3) -> float:
+    """The same sum as of `albedo_output` for a cell with a view of its own, patch by patch."""
+    edge_sin = max(NARROWEST_SIN, math.sqrt(max(0.0, 1.0 - edge * edge)))
+    hidden = side != 0.0 and dot(screen.axis_b, screen.axis_b) > 0.0
+    axis_b = scale(1.0 if side > 0.0 else -1.0, screen.axis_b)
+    shift = dot(normal_b, axis_b)
+    middle = 0.5 * (screen.full_cos + screen.dark_cos)
+    screen_sin = math.sqrt(max(0.0, 1.0 - middle * middle))
+    ramp = 0.5 * (screen.full_cos - screen.dark_cos)
+    total = 0.0
+    for j in range(PATCHES):
+        if not light[LIGHT + j] > 0.0:
+            continue
+        direction_b = multiply(dcm_bn, (float(light[X + j]), float(light[Y + j]), float(light[Z + j])))
+        if is_blocked(screen, i, unit(direction_b)):
+            continue
+        part, moved = 1.0, 0.0
+        if hidden:
+            size2 = (float(light[SIZE + j]) * screen_sin) ** 2
+            inverse = 1.0 / math.sqrt(size2 + ramp * ramp)
+            part = min(max(0.5 + 0.5 * (dot(axis_b, direction_b) - middle) * inverse, 0.0), 1.0)
+            moved = (1.0 - part) * size2 * inverse
+        mean, width = dot(normal_b, direction_b) + moved * shift, float(light[SIZE + j]) * edge_sin
+        high = mean + width
+        low = min(max(mean - width, edge), high)
+        total += part * float(light[LIGHT + j]) * (high - low) * (high + low)
+    return total / edge_sin
+
+
+@kernel
 def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Mat3, work, output) -> None:
     """Light of the Earth that each cell receives [-], 1.0 being the Sun at normal incidence at 1 AU.
 
@@ -106,7 +168,7 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
         light: patches from `earth_light.albedo_sources`.
         cells: (N,) records with the fields nx, ny, nz (outward unit normal in b) and side (see `Screen`).
         screen: what hides part of the sky.
-        cos_half_view: cosine of half the full cone of view, 0 to 1.
+        cos_half_view: cosine of half the full cone of view, 0 to 1, of cells that have none of their own.
         dcm_bn: rotation from n to b.
         work: room from `new_workspace`.
         output: (N,) written.
@@ -114,6 +176,12 @@ def albedo_output(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
     if light[DISC + DISC_LIGHT] <= 0.0:
         for i in range(output.shape[0]):
             output[i] = 0.0
+        return
+    if screen.views.shape[0] > 0 or screen.blocked.shape[0] > 0:
+        for i in range(output.shape[0]):
+            cell, edge_cos = cells[i], view_cosine(screen, i, cos_half_view)
+            normal_b = (float(cell.nx), float(cell.ny), float(cell.nz))
+            output[i] = _output_of_one(light, normal_b, float(cell.side), i, screen, edge_cos, dcm_bn)
         return
     nadir_n = (float(light[DISC]), float(light[DISC + 1]), float(light[DISC + 2]))
     sin_half_view = math.sqrt(max(0.0, 1.0 - cos_half_view * cos_half_view))

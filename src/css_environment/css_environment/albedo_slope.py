@@ -12,8 +12,8 @@ with the derivatives of the patches' soft edges in closed form.
 import math
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, scale
-from css_environment.albedo import NARROWEST_SIN, Screen
+from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, scale, unit
+from css_environment.albedo import NARROWEST_SIN, Screen, is_blocked, view_cosine
 from css_environment.earth_light import DISC, DISC_LIGHT, LIGHT, PATCHES, SIZE, X, Y, Z
 
 
@@ -31,13 +31,14 @@ def albedo_slopes(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
         if not dark:
             cell = cells[i]
             normal_b = (float(cell.nx), float(cell.ny), float(cell.nz))
-            slope = _slope(light, normal_b, float(cell.side), screen, cos_half_view, dcm_bn)
+            edge = view_cosine(screen, i, cos_half_view)
+            slope = _slope(light, normal_b, float(cell.side), i, screen, edge, dcm_bn)
         for k in range(3):
             slopes[i, k] = slope[k]
 
 
 @kernel
-def _slope(light, normal_b: Vec3, side: float, screen: Screen, edge: float, dcm_bn: Mat3) -> Vec3:
+def _slope(light, normal_b: Vec3, side: float, i: int, screen: Screen, edge: float, dcm_bn: Mat3) -> Vec3:
     edge_sin = max(NARROWEST_SIN, math.sqrt(max(0.0, 1.0 - edge * edge)))
     hidden = side != 0.0 and dot(screen.axis_b, screen.axis_b) > 0.0
     # the mirrored axis of a cell on the negative side has the same edge
@@ -63,6 +64,8 @@ def _slope(light, normal_b: Vec3, side: float, screen: Screen, edge: float, dcm_
         mean = dot(normal_b, direction_b) + moved * shift
         high = mean + width
         if high <= edge:
+            continue
+        if screen.blocked.shape[0] > 0 and light[LIGHT + j] > 0.0 and is_blocked(screen, i, unit(direction_b)):
             continue
         low = max(mean - width, edge)
         brightness = float(light[LIGHT + j]) / edge_sin

@@ -173,6 +173,23 @@ def test_any_sequence_with_parameters_at_the_ends_of_their_ranges(kind, data):
         assert_sane(heading, largest_variance=100.0)
 
 
+@pytest.mark.parametrize("dt", [5e-324, 1e-300, 1e-31, 1e-13])
+@pytest.mark.parametrize("kind", KINDS, ids=executable)
+def test_no_rate_is_divided_by_a_step_of_next_to_no_time(kind, dt):
+    """Stamps are whole nanoseconds; of a shorter step the quotients overflow, and infinity times zero is no number."""
+    count = max(layouts(kind))
+    with_field = any(parameter.name == "rate.use_field" for parameter in kind.parameters)
+    p, state, memory = build(kind, count, **({"rate__use_field": True} if with_field else {}))
+    measured = UNAIDED._replace(field_b=(3e-5, -1e-5, 0.0), field_valid=True)
+    for angle, step in ((0.0, 0.1), (0.001, 0.1), (0.002, dt), (0.003, dt), (0.004, 0.1)):
+        sun_b = (0.0, math.sin(0.6 + angle), math.cos(0.6 + angle))
+        outputs_now = outputs_of(kind, count, sun_b)
+        state, heading = kind.algorithm.step(
+            p, state, memory, step, outputs_now, predicting(PREDICTION_SUNLIT, measured)
+        )
+        assert_sane(heading)
+
+
 @BY_COUNT
 @pytest.mark.parametrize("level", [0.0, 1e-300, 0.5, 1.0, 1e30, 1e90, 1e200])
 def test_all_outputs_equal(kind, options, count, level):

@@ -21,7 +21,7 @@ from css_estimation.sun.sun_heading import (
     VALIDITY_HELD,
     VALIDITY_VALID,
 )
-from css_estimation.sun_filter import sun_filter
+from css_estimation.sun_filter import filter_state, sun_filter
 from css_estimation.sun_filter.cell_model import rising
 from css_estimation.sun_filter.response import respond
 
@@ -80,7 +80,7 @@ def test_an_earth_that_is_known_disturbs_less_and_one_that_is_not_is_within_the_
             monkeypatch.setattr(flight, "voltages", partial(_with_earth, flight, flight.voltages))
         heading = flight.fly(400.0, gyro=True)
         errors.append(flight.error_deg(heading))
-    assert heading.mode == sun_filter.MODE_NO_EARTH
+    assert heading.mode == filter_state.MODE_NO_EARTH
     sigma_deg = math.degrees(math.sqrt(np.trace(np.reshape(heading.covariance, (3, 3))) / 2.0))
     assert sigma_deg > 1.0 and errors[1] < 3.0 * sigma_deg
     assert errors[0] < 0.7
@@ -134,7 +134,7 @@ def test_dusk_is_no_turn(known):
             worst = max(worst, flight.error_deg(heading))
         heading = flight.fly(600.0, part=0.0)
         assert worst < 0.3
-        assert (heading.validity, heading.mode) == (VALIDITY_HELD, sun_filter.MODE_COASTING)
+        assert (heading.validity, heading.mode) == (VALIDITY_HELD, filter_state.MODE_COASTING)
         assert heading.rate_source == RATE_MOMENTUM
         errors.append(flight.error_deg(heading))
         normalised.append(np.radians(errors[-1]) ** 2 / sum(heading.covariance[::4]))
@@ -230,7 +230,7 @@ def test_a_silence_is_not_bridged():
     flight.fly(60.0)
     aiding = UNAIDED._replace(sky=flight.sky)
     flight.state, heading = sun_filter.step(flight.p, flight.state, flight.memory, 60.0, flight.voltages(), aiding)
-    assert heading.mode == sun_filter.MODE_SEARCHING
+    assert heading.mode == filter_state.MODE_SEARCHING
     assert flight.error_deg(flight.fly(30.0)) < 1.0
 
 

@@ -13,7 +13,7 @@ from css_common.vectors import axes_across, matmul, multiply, multiply_transpose
 from css_environment.albedo import albedo_output, new_workspace
 from css_estimation.nodes.sun_filter import SunFilter
 from css_estimation.sun.sun_heading import UNAIDED
-from css_estimation.sun_filter import sun_filter
+from css_estimation.sun_filter import filter_state, sun_filter
 from css_estimation.sun_filter.calibration_report import calibration_line, calibration_report, calibration_states
 from css_estimation.sun_filter.cell_update import read_cells
 from css_estimation.sun_filter.hypotheses import earth_is_elsewhere
@@ -198,7 +198,7 @@ def test_a_gap_keeps_the_calibration_and_a_wrong_estimate_loses_it():
     flight.fly(150.0, gyro=True)
     flight.dcm_bn = matmul(rotation_vector_to_dcm((2.5, 0.0, 0.0)), flight.dcm_bn)
     for _ in range(round(60.0 / DT)):
-        if flight.step(gyro=True).mode == sun_filter.MODE_SEARCHING:
+        if flight.step(gyro=True).mode == filter_state.MODE_SEARCHING:
             break
     states, covariance = calibration_states(flight.p, flight.memory)
     np.testing.assert_array_equal(states, 0.0)
@@ -217,7 +217,7 @@ def test_clouds_that_are_none_make_the_turn_be_looked_for_again_and_the_calibrat
     assert earth_is_elsewhere(flight.p, memory.estimates[best])
     learnt, _ = calibration_states(flight.p, memory)
     heading = flight.step(gyro=True)
-    assert heading.mode == sun_filter.MODE_EARTH
+    assert heading.mode == filter_state.MODE_EARTH
     assert np.all(memory.weights > DEAD), "all turns are possible again"
     states, covariance = calibration_states(flight.p, memory)
     np.testing.assert_allclose(states, learnt, atol=0.005)

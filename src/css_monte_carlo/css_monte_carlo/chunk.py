@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A few cases of one configuration flown from start to end: the unit of work, of resuming and of distribution."""
 
-import os
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,6 +12,8 @@ import pyarrow as pa
 
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
+from css_common.processors import usable_processors
+from css_monte_carlo.case_missions import drawn_columns
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import Tallies
 from css_monte_carlo.drawn_faults import COLUMN, fault_column, has_faults
@@ -62,6 +63,8 @@ def flown_task(task: ChunkTask) -> tuple[pa.Table, float]:
     table = case_table(numbers, tallies, period_s, windows_of(flight.mission))
     if has_faults(flight.mission):
         table = table.append_column(COLUMN, fault_column(flight.mission, numbers))
+    for name, values in drawn_columns(flight.mission, numbers).items():
+        table = table.append_column(name, values)
     return table, cpu_s
 
 
@@ -82,10 +85,11 @@ def fly_cases(
     """Flies cases (C,) of a mission, each independent of the others; `guess_deg` as of `MissionFlight.cases`."""
     if not flight.own_surroundings:
         return _fly_together(flight, numbers, sample_every, guess_deg, traced)
-    parts = [
-        _fly_together(flight.around_case(int(number)), np.array([number]), sample_every, guess_deg, traced)
-        for number in numbers
-    ]
+    parts = []
+    for number in numbers:
+        alone = flight.around_case(int(number))
+        own = np.array([alone.mission.values.mission.case])
+        parts.append(_fly_together(alone, own, sample_every, guess_deg, traced))
     trace = np.concatenate([part.trace for part in parts])
     return Flown(_joined([part.tallies for part in parts]), trace, sum(part.cpu_s for part in parts))
 
@@ -133,7 +137,7 @@ def fly_in_threads(
         progress: told how many cases are done, and of how many.
     """
     numbers = [np.arange(first, min(first + _SHARE, cases)) for first in range(0, cases, _SHARE)]
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(usable_processors()) as pool:
         futures = [[pool.submit(fly_cases, flight, part, 1, guess_deg) for part in numbers] for flight in flights]
         done, total = 0, cases * len(flights)
         for of_flight in futures:

@@ -12,6 +12,7 @@ from css_common.fault_lines import FAULTS
 from css_common.mission import Mission, Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.sections import PERIOD
+from css_monte_carlo.case_missions import case_mission
 from css_sim import cell_faults, faults
 from css_sim.nodes.css_array import CssArray
 
@@ -29,8 +30,18 @@ def fault_column(mission: Mission, numbers: np.ndarray) -> pa.Array:
 
     Faults that scripted events set are not drawn, and not in it.
     """
-    lines = [list(_texts(mission, random_key(mission.values.mission.seed, int(number)))) for number in numbers]
+    seed = mission.values.mission.seed
+    flown = (_flown(mission, int(number)) for number in numbers)
+    lines = [list(_texts(flies, random_key(seed, own))) for flies, own in flown]
     return pa.array(lines, pa.list_(pa.string()))
+
+
+def _flown(mission: Mission, number: int) -> tuple[Mission, int]:
+    """The mission of a case, and the case whose draws it flies."""
+    if not mission.dispersions:
+        return mission, number
+    flies = case_mission(mission, number)
+    return flies, flies.values.mission.case
 
 
 def _texts(mission: Mission, key: RandomKey) -> Iterator[str]:

@@ -135,7 +135,7 @@ def fly_block(
             wheels, felt_torque, felt_dipole = felt
         body = RigidBody(inertia, inverse, wheels, v.craft.body.substeps)
         disturbances = with_dipole(v.craft.disturbances, row(cases.dipole, c))
-        craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipole, v.craft.disturbed)
+        craft = Spacecraft(body, disturbances, v.craft.rod_axes_b, v.craft.rod_max_dipoles, v.craft.disturbed)
         key = RandomKey(cases.seed_low, cases.seed_high, cases.numbers[c])
         cells = CellsOfCase(cases.cells[c], faults, cases.albedo[c], cases.work[c])
         gyro_errors = gyro.draw_errors(v.sensors.gyro, key)
@@ -156,7 +156,7 @@ def fly_block(
                 if v.clouds.moving and (k == 0 or is_cloud_step(elapsed_ns, v.period_ns)):
                     motion = CloudMotion(*row(cases.cloud_motion, c))
                     reflect(v.clouds, motion, cases.cloud_fields[c], elapsed_ns, cases.reflectivity[c])
-                _own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
+                own_light(v.albedo_model, around, k, environment, cases.reflectivity[c], light)
             read = sense(v.sensors, sensors, step, dcm_bn, sun_b, rotation, environment, light, voltages)
             if read.field_valid:
                 field_b, field_step = read.field_b, step
@@ -235,7 +235,7 @@ def sum_of_sizes(values) -> float:
 
 
 @kernel
-def _own_light(albedo_model, around, k, e, reflectivity, light_out) -> None:
+def own_light(albedo_model, around, k, e, reflectivity, light_out) -> None:
     """Light of an Earth of its own (192,), written."""
     if albedo_model == PATCHES:
         gather_light_at(around.views, k, reflectivity, light_out)

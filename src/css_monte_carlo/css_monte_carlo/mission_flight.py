@@ -24,6 +24,7 @@ from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sky_table import aligned_table
 from css_estimation.sun.sun_estimator import SunEstimator, hears_field, hears_wheels
 from css_monte_carlo.attitude_guess import guessed_start
+from css_monte_carlo.case_missions import case_mission, share_surroundings
 from css_monte_carlo.case_tallies import step_marks
 from css_monte_carlo.failing_units import uncertainty_of
 from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
@@ -72,16 +73,19 @@ class MissionFlight:
         mission: what flies.
         steps: control cycles of a flight.
         measure: how the estimator of interest is measured.
-        own_surroundings: cases differ in orbit or epoch, and share neither `surroundings` nor `marks`.
+        own_surroundings: cases differ in orbit, epoch or parameters, and each has flights of its own, `around_case`.
         surroundings: the environment that all cases share, or that of one case.
         marks: (steps,) what is special about each step, see `case_tallies.step_marks`.
     """
 
-    def __init__(self, mission: Mission, estimator: str | None = None) -> None:
+    def __init__(
+        self, mission: Mission, estimator: str | None = None, surrounded_as: "MissionFlight | None" = None
+    ) -> None:
         """Prepares what all cases share.
 
         Args:
             estimator: node whose estimates are measured, None: `graph.estimator`.
+            surrounded_as: flights whose surroundings are those of this mission, too.
 
         Raises:
             NoPlace: the graph has a node, or the mission an event, that the compiled loop has no place for.
@@ -100,28 +104,43 @@ class MissionFlight:
         if self._grid is not None:
             common = earth_reflectivity.case_reflectivity(array, self._grid, self._key(mission.values.mission.case))
         values = mission.values.mission
-        self.own_surroundings = orbit_dispersion.is_dispersed(self._plant.values) or values.epoch_spread_days > 0.0
+        self.own_places = orbit_dispersion.is_dispersed(self._plant.values) or values.epoch_spread_days > 0.0
+        self.own_surroundings = self.own_places or bool(mission.dispersions)
         self._measured = estimator
         # an attitude filter is aided by references of its own, or as a Sun estimator is
         aided = self._filter is not None and getattr(_algorithm(self._filter), "AIDED_BY_SKY", False)
         self._aided = _values(self._filter) if aided else None
-        self.surroundings = SurroundingsTables(
+        self.surroundings: SurroundingsTables = (
+            self._surroundings(common, aided) if surrounded_as is None else surrounded_as.surroundings
+        )
+        illumination = self.surroundings.states(0, self.steps)["illumination"]
+        self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
+
+    def _surroundings(self, common: np.ndarray | None, aided: bool) -> SurroundingsTables:
+        array, values = self._array.values, self.mission.values.mission
+        return SurroundingsTables(
             self._plant.values,
             _values(self._heading),
             None if aided else _values(self._filter),
             self._aided,
             common,
             self._own_earth,
-            self._feels_field(),
+            self.feels_field,
             MODELS[array.albedo.model],
             orbit_dispersion.case_orbit(self._plant.values, self._key(values.case)),
         )
-        illumination = self.surroundings.states(0, self.steps)["illumination"]
-        self.marks = step_marks(illumination, mission.period_ns * 1e-9, windows_of(mission))
 
     def around_case(self, case: int) -> "MissionFlight":
-        """The same flights in the surroundings of a case, where cases differ in theirs (`own_surroundings`)."""
-        return MissionFlight(self.mission.with_overrides([f"mission.case={case}"]), self._measured)
+        """The flights of a case alone, where cases differ in their surroundings or parameters (`own_surroundings`).
+
+        Its own draws are those of `mission.case` of its mission.
+
+        Raises:
+            MissionError: the case draws parameters that cannot fly.
+        """
+        mission = case_mission(self.mission, case)
+        shared = not self.own_places and share_surroundings(self.mission.dispersions)
+        return MissionFlight(mission, self._measured, self if shared else None)
 
     @property
     def trace_columns(self) -> int:
@@ -312,7 +331,9 @@ class MissionFlight:
         sensors = (self._array, self._gyro, self._magnetometer)
         return [latency.NO_LATENCY if node is None else latency.parameters(node.values) for node in sensors]
 
-    def _feels_field(self) -> bool:
+    @property
+    def feels_field(self) -> bool:
+        """Whether the magnetic field does something to the spacecraft or is measured."""
         plant = self._plant.values
         return self._magnetometer is not None or plant.rods.fitted or initial_conditions.has_dipole(plant)
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from typing import Any, NamedTuple, Self
 
+from css_common.processors import usable_processors
 from css_monte_carlo.chunk import ChunkTask, flown_task
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.study_folder import parquet_bytes
@@ -48,7 +49,7 @@ class ThreadScheduler(Scheduler):
     """
 
     def __init__(self, threads: int | None = None) -> None:
-        self._pool = ThreadPoolExecutor(threads or len(os.sched_getaffinity(0)))
+        self._pool = ThreadPoolExecutor(threads or usable_processors())
 
     def __exit__(self, *_: object) -> None:
         # an interrupt waits for the chunks that fly, not for those that only wait
@@ -86,7 +87,7 @@ class DaskScheduler(Scheduler):
         self._cluster: Any = None
         try:
             if address == "local":
-                workers = workers or len(os.sched_getaffinity(0))
+                workers = workers or usable_processors()
                 self._cluster = LocalCluster(workers, threads_per_worker=1, dashboard_address=None)
             self._client = Client(self._cluster or address, timeout=timeout_s)
         except (OSError, ValueError) as error:

@@ -13,6 +13,7 @@ from css_common.mission import Mission, MissionError
 from css_common.random_streams import RandomKey, random_key
 from css_monte_carlo.attitude_guess import takes_guess, with_guess
 from css_monte_carlo.attitude_tallies import AttitudeTallies
+from css_monte_carlo.case_missions import case_mission
 from css_monte_carlo.direct_flight import fly_checked
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.log_tallies import tally_attitudes, tally_headings
@@ -60,8 +61,8 @@ class SteppedFlight:
             len(numbers), self.mission.steps, period_s, sample_every, windows_of(self.mission)
         )
         for c, number in enumerate(numbers):
-            key = random_key(self.mission.values.mission.seed, int(number))
-            flown = self.mission.with_overrides([f"mission.case={number}"])
+            flown = case_mission(self.mission, int(number))
+            key = random_key(flown.values.mission.seed, flown.values.mission.case)
             if guess_deg > 0.0 and takes_guess(flown, self._estimator):
                 flown = with_guess(flown, key, guess_deg)
             try:
@@ -69,21 +70,23 @@ class SteppedFlight:
             except MotionError as error:
                 raise StudyError(f"case {number} of {flown.name}: {error}") from error
             if isinstance(tallies, AttitudeTallies):
-                tally_attitudes(tallies, c, log, self._estimator, self._gyro_bias(key))
+                tally_attitudes(tallies, c, log, self._estimator, _gyro_bias(flown, key))
             else:
-                tally_headings(tallies, c, log, self._estimator, self._wheels(key))
+                tally_headings(tallies, c, log, self._estimator, _wheels(flown, key))
         return tallies, time.thread_time() - start
 
-    def _gyro_bias(self, key: RandomKey) -> np.ndarray:
-        """True bias of the gyro (K, 3) [rad/s] at every step; NaN without a gyro, or with several."""
-        nodes = [node for node in self.mission.nodes if node.component is Gyro]
-        if len(nodes) != 1:
-            return np.full((self.mission.steps, 3), np.nan)
-        p = gyro.parameters(nodes[0].values)
-        errors = gyro.draw_errors(p, key)
-        return np.array([gyro.bias_at(p, errors, key, step) for step in range(self.mission.steps)])
 
-    def _wheels(self, key: RandomKey) -> np.ndarray:
-        """Wheels (N,) of `rigid_body.WHEEL`; none when the plant has none."""
-        plants = [node for node in self.mission.nodes if node.component is Dynamics]
-        return initial_conditions.dispersed_body(plants[0].values, key).wheels if plants else np.zeros(0)
+def _gyro_bias(mission: Mission, key: RandomKey) -> np.ndarray:
+    """True bias of the gyro (K, 3) [rad/s] at every step; NaN without a gyro, or with several."""
+    nodes = [node for node in mission.nodes if node.component is Gyro]
+    if len(nodes) != 1:
+        return np.full((mission.steps, 3), np.nan)
+    p = gyro.parameters(nodes[0].values)
+    errors = gyro.draw_errors(p, key)
+    return np.array([gyro.bias_at(p, errors, key, step) for step in range(mission.steps)])
+
+
+def _wheels(mission: Mission, key: RandomKey) -> np.ndarray:
+    """Wheels (N,) of `rigid_body.WHEEL`; none when the plant has none."""
+    plants = [node for node in mission.nodes if node.component is Dynamics]
+    return initial_conditions.dispersed_body(plants[0].values, key).wheels if plants else np.zeros(0)

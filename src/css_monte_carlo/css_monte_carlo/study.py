@@ -16,6 +16,7 @@ from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight, report
 from css_monte_carlo import chunk
 from css_monte_carlo.attitude_guess import takes_guess
+from css_monte_carlo.case_missions import drawn_names
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.direct_flight import configured, is_attitude_filter, refuse_what_needs_the_graph
 from css_monte_carlo.drawn_faults import COLUMN, has_faults
@@ -27,6 +28,9 @@ from css_monte_carlo.study_folder import StudyFolder
 
 CHUNK_CASES = 20
 """Cases of one chunk: a second or two of work for an orbit."""
+
+MISSION_FILE = "mission.yaml"
+"""What a study of dispersed parameters flies, as a file: `fly` flies any of its cases."""
 
 Progress = Callable[[int, int], None]
 """Called with cases done and cases in all."""
@@ -62,7 +66,8 @@ class Study:
         folder: where it lies.
         manifest: what was asked for.
         cases: one row per configuration and case: estimator, gyro, overrides, case and the quantities of `measures`;
-            null what is not of the kind of the estimator. With faults in the mission, `faults` lists those of the case.
+            null what is not of the kind of the estimator. With faults in the mission, `faults` lists those of the case;
+            `drawn.KEY` is what the case drew for a dispersed parameter.
         percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
@@ -138,6 +143,8 @@ def run_study(
     manifest |= {"attitude_filters": filters} if filters else {}
     manifest |= {"guess_deg": guess_deg} if guess_deg > 0.0 else {}
     store.prepare(manifest)
+    if mission.dispersions:
+        store.keep(MISSION_FILE, mission.text())
     if store.complete:
         return replace(read_study(folder), warnings=warnings)
     ranges = [_ranges(first_case, first_case + cases, 1 if reason else CHUNK_CASES) for reason in stepped]
@@ -167,7 +174,7 @@ def run_study(
             configuration,
             ATTITUDE if configuration.estimator in filters else HEADING,
             windows_of(flown),
-            has_faults(flown),
+            (*((COLUMN,) if has_faults(flown) else ()), *drawn_names(flown)),
             [_chunk_name(i, *chunk) for chunk in ranges[i]],
         )
         for i, (configuration, flown) in enumerate(zip(configurations, missions, strict=True))
@@ -226,15 +233,15 @@ class _Part(NamedTuple):
     configuration: Configuration
     measure: Measure
     windows: Windows
-    failing: bool
+    further: tuple[str, ...]  # columns beside those of the measure
     chunks: list[str]
 
 
 def _merged_cases(store: StudyFolder, parts: Sequence[_Part]) -> pa.Table:
     tables = []
     for part in parts:
-        columns = ["case", *(quantity.study_column for quantity in part.measure.quantities(part.windows))]
-        columns += [COLUMN] if part.failing else []
+        measured = [quantity.study_column for quantity in part.measure.quantities(part.windows)]
+        columns = ["case", *measured, *part.further]
         table = pa.concat_tables([store.read_chunk(name, columns) for name in part.chunks]).combine_chunks()
         tables.append(_labelled(part.configuration, table))
     # a sweep may change what is measured, and estimators of each kind have columns of their own

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.intervals import share_interval
 from css_analysis.quantities import QUANTITIES
 from css_common.mission import SHARED, Mission, MissionError, mission_from_text
 from css_common.schema import unknown_name
@@ -38,7 +39,11 @@ class Judged(NamedTuple):
         """PASS or FAIL, and which criteria are missed by which cases."""
         name = " ".join(filter(None, (self.labels["estimator"], self.labels["overrides"])))
         word = "PASS" if self.passed else "FAIL"
-        lines = [f"{word}  {self.met} of {self.cases} cases meet the criteria, must be {self.required}  ({name})"]
+        low, high = share_interval(self.met, self.cases)
+        sure = f"95 % interval {low:.1%} to {high:.1%}"
+        lines = [
+            f"{word}  {self.met} of {self.cases} cases meet the criteria, must be {self.required}, {sure}  ({name})"
+        ]
         for criterion, numbers in self.missed.items():
             if numbers:
                 shown = ", ".join(map(str, numbers[:_NAMED])) + (", ..." if len(numbers) > _NAMED else "")
@@ -47,7 +52,12 @@ class Judged(NamedTuple):
 
     def as_object(self) -> dict[str, Any]:
         """What `--json` says."""
-        return {"met": self.met, "required": self.required, "missed": {k: len(v) for k, v in self.missed.items()}}
+        return {
+            "met": self.met,
+            "required": self.required,
+            "met_share_interval_95": share_interval(self.met, self.cases),
+            "missed": {k: len(v) for k, v in self.missed.items()},
+        }
 
 
 def refuse_unknown_criteria(mission: Mission) -> None:

@@ -2,6 +2,7 @@
 """The folder of a study: its parameters, chunks while it runs, results when it is done. Every file appears whole.
 
 study.json           what was asked for; a folder made with other parameters is refused
+mission.yaml         the mission, where it disperses parameters
 chunks/              finished pieces of an unfinished study
 cases.parquet        one row per configuration and case
 percentiles.parquet  one row per configuration, quantity and time; written last: a study with it is complete
@@ -44,6 +45,17 @@ class StudyFolder:
             self._write(found, json.dumps(manifest, indent=1).encode())
         except OSError as error:
             raise StudyError(f"{self.path}: cannot be written: {error.strerror}") from error
+
+    def keep(self, name: str, text: str) -> None:
+        """Keeps a text as a file of the folder.
+
+        Raises:
+            StudyError: the disk says no.
+        """
+        try:
+            self._write(self.path / name, text.encode())
+        except OSError as error:
+            raise StudyError(f"{self.path / name}: cannot be written: {error.strerror}") from error
 
     @property
     def complete(self) -> bool:

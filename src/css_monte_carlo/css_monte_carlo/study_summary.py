@@ -8,6 +8,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from css_analysis.flight_metrics import windows_of
+from css_analysis.intervals import Interval, mean_interval, percentile_interval, share_interval
 from css_analysis.quantities import Summary
 from css_common.mission import mission_from_text
 from css_monte_carlo.measures import ATTITUDE, HEADING
@@ -15,7 +16,11 @@ from css_monte_carlo.study import Study
 
 
 def configuration_objects(study: Study) -> list[dict[str, Any]]:
-    """One dictionary per configuration: means over the cases; None for what no case reached."""
+    """One dictionary per configuration: means over the cases; None for what no case reached.
+
+    `interval_95` has the ends of the 95 % interval of each, None for an end that too few cases tell. No cases bound the
+    largest of all: for these it is the number itself, and None.
+    """
     return [
         {
             "estimator": labels["estimator"],
@@ -23,6 +28,10 @@ def configuration_objects(study: Study) -> list[dict[str, Any]]:
             "overrides": labels["overrides"].split(),
             **{
                 summary.name: _over(rows_of(study.cases, **labels), summary)
+                for summary in summaries_of(study, labels["estimator"])
+            },
+            "interval_95": {
+                summary.name: _interval(rows_of(study.cases, **labels), summary)
                 for summary in summaries_of(study, labels["estimator"])
             },
         }
@@ -68,3 +77,14 @@ def _over(cases: pa.Table, summary: Summary) -> float | None:
     if summary.over == "p95":
         return float(np.percentile(known, 95.0))
     return float(np.max(known) if summary.over == "max" else np.mean(known))
+
+
+def _interval(cases: pa.Table, summary: Summary) -> Interval:
+    known = cases[summary.of].drop_null().to_numpy()
+    if summary.over == "share":
+        return share_interval(len(known), cases.num_rows)
+    if summary.over == "p95":
+        return percentile_interval(known, 95.0)
+    if summary.over == "max":
+        return (float(np.max(known)) if len(known) else None, None)
+    return mean_interval(np.asarray(known, dtype=np.float64))

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MCAP flight recordings in rosbag2 layout: recorder, player, recovery, import and reading."""
+"""MCAP flight recordings in rosbag2 layout: recorder, player, recovery and reading."""

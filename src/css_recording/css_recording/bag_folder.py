@@ -3,6 +3,7 @@
 
 import fcntl
 import os
+import sys
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -49,9 +50,9 @@ def prepare_folder(folder: Path, overwrite: bool) -> None:
 
 
 def create_file(path: Path) -> IO[bytes]:
-    """Open a new file for writing, locked; one that exists, perhaps another recorder's, is refused."""
+    """Open a new file for writing and reading, locked; one that exists, perhaps another recorder's, is refused."""
     try:
-        file = path.open("xb")
+        file = path.open("x+b")
     except OSError as error:
         raise BagError(f"{path}: cannot create the recording: {error.strerror}") from error
     with suppress(OSError):  # not every file system knows locks
@@ -75,6 +76,8 @@ def place_of(descriptor: int) -> Path | None:
     """Where an open file is now, however it was renamed; None when it was deleted."""
     if os.fstat(descriptor).st_nlink == 0:
         return None
+    if sys.platform == "darwin":
+        return Path(os.fsdecode(fcntl.fcntl(descriptor, fcntl.F_GETPATH, bytes(1024)).rstrip(b"\0")))
     return Path(os.readlink(f"/proc/self/fd/{descriptor}"))
 
 

@@ -6,7 +6,6 @@ as fast as through the library: a recorder takes its time from the flight that i
 """
 
 import os
-import shutil
 import zlib
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -32,6 +31,7 @@ from css_recording.schemas import MessageSchema
 
 LIBRARY = "sunpoint css_recording"
 _MAX_CHUNK_BYTES = 1 << 20
+_COPIED_AT_A_TIME = 1 << 20  # [bytes]
 _CRC_BYTES = 4
 
 
@@ -128,7 +128,7 @@ class McapOutput:
         self._write(summary + bytes_of(footer) + MAGIC)
         os.fsync(self.descriptor)
         if copy is not None:
-            shutil.copyfile(f"/proc/self/fd/{self.descriptor}", copy)
+            _copy(self.descriptor, copy)
         self._file.close()
 
     def abandon(self) -> None:
@@ -149,3 +149,12 @@ class McapOutput:
         self._file.flush()
         self._crc = zlib.crc32(data, self._crc)
         self._position += len(data)
+
+
+def _copy(descriptor: int, copy: Path) -> None:
+    """Writes all of an open file to another; by its descriptor, for its name may be gone."""
+    with copy.open("wb") as file:
+        at = 0
+        while part := os.pread(descriptor, _COPIED_AT_A_TIME, at):
+            file.write(part)
+            at += len(part)

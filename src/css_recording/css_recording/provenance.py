@@ -12,6 +12,9 @@ from css_common import places
 
 _LIBRARIES = ("css_recording", "css_sim", "css_estimation", "sunpoint_control", "numpy", "numba", "mcap")
 _LOCK_FILE = "requirements.lock"
+IMPORTED_FROM = "imported_from"
+"""Entry of a recording that was made of a table of telemetry: JSON with its file, hash and known parts of the truth."""
+
 SEAL = "sha256"
 """Entry that holds the check sums of those beside it."""
 

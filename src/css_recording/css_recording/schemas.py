@@ -12,12 +12,12 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rosbags.interfaces import Nodetype
 from rosbags.interfaces.typing import Typesdict
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from css_common.installed import share_folder
 from css_recording.errors import BagError
 
 _SEPARATOR = "=" * 80
@@ -141,12 +141,9 @@ def hash_of(type_name: str, text: str) -> str:
 def _share_file(type_name: str, suffix: str) -> Path:
     package, name = split_type_name(type_name)
     try:
-        share = get_package_share_directory(package)
-    except (PackageNotFoundError, LookupError, ValueError) as error:
-        raise BagError(
-            f"message type {type_name}: package {package} is not installed (searched AMENT_PREFIX_PATH)"
-        ) from error
-    return Path(share, "msg", name + suffix)
+        return share_folder(package) / "msg" / f"{name}{suffix}"
+    except LookupError as error:
+        raise BagError(f"message type {type_name}: {error.args[0]}") from error
 
 
 def _definition_text(type_name: str) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 
 from css_common.declared import builder, given, table_of
 from css_common.schema import Values, integers, real, reals
-from css_environment.albedo import Screen, plane_screen, soft_screen
-from css_sensors.cells import CLIP_NORMAL, NORMALS, plane_sides
+from css_environment.albedo import Screen, plane_screen, soft_screen, with_views
+from css_sensors.cells import CLIP_NORMAL, NORMALS, blocked_directions, own_view_cosines, plane_sides
 
 
 class Collar(NamedTuple):
@@ -34,12 +34,14 @@ _collar = builder(Collar)
 
 
 def screen(values: Values) -> Screen:
-    """The collar if there is one, else the body plane of the mission's cells."""
+    """The collar if there is one, else the body plane of the mission's cells; and what single cells do not see."""
     collar = _collar(values)
     if np.any(collar.axis_b):
         angles = np.radians([collar.full_deg, collar.dark_deg])
-        return soft_screen(collar.axis_b, *angles.tolist())
-    return plane_screen(values[CLIP_NORMAL])
+        around = soft_screen(collar.axis_b, *angles.tolist())
+    else:
+        around = plane_screen(values[CLIP_NORMAL])
+    return with_views(around, own_view_cosines(values), blocked_directions(values))
 
 
 def cell_sides(values: Values) -> np.ndarray:

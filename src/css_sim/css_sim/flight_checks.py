@@ -17,17 +17,21 @@ from css_common.sections import (
     INERTIA,
     ORBIT_SOURCE,
     PERIOD,
+    ROD_AXES,
+    ROD_MAX_DIPOLE,
     RODS_FITTED,
     WHEEL_INERTIA,
     WHEEL_MAX_SPEED,
+    WHEEL_MAX_TORQUE,
     WHEELS_FITTED,
+    of_each_wheel,
     wheel_axes,
 )
 from css_common.vectors import Vec3
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.orbit_checks import field_findings, orbit_findings
 from css_sim import initial_conditions
-from css_sim.disturbances import DIPOLE, GRAVITY_GRADIENT
+from css_sim.disturbances import DIPOLE, GRAVITY_GRADIENT, TORQUE
 from css_sim.flight_environment import GEOMAGNETIC_FIELD
 from css_sim.initial_conditions import FIXED_RATE, MAX_RATE, RATE, WHEEL_SPEEDS, has_dipole
 
@@ -68,6 +72,7 @@ def plant_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
         yield from field_findings(values)
     yield from _rate_findings(values)
     yield from _swing_findings(values)
+    yield from _torque_findings(values)
     if values[WHEELS_FITTED]:
         controlled = any(
             output.topic == "wheels/torque_command" for other in graph.values() for output in other.outputs
@@ -137,8 +142,31 @@ def _swing_findings(values: Values) -> Iterator[Finding]:
             )
 
 
+def _torque_findings(values: Values) -> Iterator[Finding]:
+    """Torques that within one cycle, in which nobody commands another, turn the body as no spacecraft turns."""
+    period, smallest = values[PERIOD], float(np.linalg.eigvalsh(values[INERTIA])[0])
+    torques = {"disturbances.torque": float(np.linalg.norm(values[TORQUE]))}
+    if values[WHEELS_FITTED]:
+        axes = wheel_axes(values)
+        together = float(np.linalg.norm(axes, 2)) * math.sqrt(len(axes))  # no torques of +-1 along them sum up to more
+        torques["wheels.max_torque"] = values[WHEEL_MAX_TORQUE] * together
+    if values[RODS_FITTED]:
+        dipole = values[ROD_MAX_DIPOLE] * math.sqrt(len(values[ROD_AXES]))
+        torques["rods.max_dipole"] = dipole * _FIELD_AT_GROUND
+    for key, torque in torques.items():
+        faster = torque / smallest * period
+        if faster > FASTEST or 0.5 * faster * period > _FARTHEST_TURN:
+            shown = f"{math.degrees(faster):.3g} deg/s" if faster < math.inf else "without bound"
+            yield Finding(
+                f"{key}: up to {torque:.3g} N m given, which in a cycle of {period:g} s makes a body of "
+                f"{smallest:.3g} kg m^2 faster by {shown}, expected at most "
+                f"{min(FASTEST, 2.0 * _FARTHEST_TURN / period) * smallest / period:.3g} N m",
+                refused=faster > FASTEST,
+            )
+
+
 def _wheel_findings(values: Values, controlled: bool) -> Iterator[Finding]:
-    limit, given = values[WHEEL_MAX_SPEED], values[WHEEL_SPEEDS]
+    limit, given = float(np.min(of_each_wheel(values, WHEEL_MAX_SPEED))), values[WHEEL_SPEEDS]
     first = float(np.max(np.abs(given), initial=0.0))
     needed = first + _needed_speed_rpm(values)
     if first >= _NEARLY_FULL * limit:
@@ -157,5 +185,6 @@ def _needed_speed_rpm(values: Values) -> float:
     """Largest speed of a wheel when all have taken up the body's first momentum, over the signs of its rates."""
     _, rates = _first_rates(values)
     share = np.linalg.pinv(wheel_axes(values).T) @ values[INERTIA]
-    momenta = [np.max(np.abs(share @ (rates * signs))) for signs in itertools.product((1.0, -1.0), repeat=3)]
-    return float(max(momenta)) / values[WHEEL_INERTIA] / _RADIANS_PER_RPM
+    inertias = of_each_wheel(values, WHEEL_INERTIA)
+    speeds = [np.max(np.abs(share @ (rates * signs)) / inertias) for signs in itertools.product((1.0, -1.0), repeat=3)]
+    return float(max(speeds)) / _RADIANS_PER_RPM

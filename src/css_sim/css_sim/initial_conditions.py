@@ -15,7 +15,7 @@ from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Values, choice, real, reals
-from css_common.sections import INERTIA, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, wheel_axes
+from css_common.sections import INERTIA, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel, wheel_axes
 from css_common.vectors import Vec3, vector_of
 from css_sim import wheel_friction
 from css_sim.disturbances import DIPOLE
@@ -94,10 +94,10 @@ def conflicts(values: Values) -> Iterator[str]:
         expected = f"none, 1 or {wheels}" if wheels else "none without wheels"
         yield f"initial.wheel_speed_rpm: {len(speeds)} values given, expected {expected}"
     coulomb = wheel_friction.parameters(values).coulomb
-    if wheels and coulomb > 0.0 and coulomb >= values[WHEEL_MAX_TORQUE]:
+    if wheels and coulomb > 0.0 and coulomb >= np.min(of_each_wheel(values, WHEEL_MAX_TORQUE)):
         yield f"friction.coulomb: {coulomb:g} given, expected less than wheels.max_torque, which would not turn a wheel"
     fastest = np.max(np.abs(speeds), initial=0.0)
-    if fastest > values[WHEEL_MAX_SPEED]:
+    if wheels and len(speeds) in (1, wheels) and np.any(np.abs(speeds) > of_each_wheel(values, WHEEL_MAX_SPEED)):
         yield f"initial.wheel_speed_rpm: {fastest:g} given, expected at most wheels.max_speed_rpm"
 
 
@@ -173,7 +173,9 @@ def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBo
     """
     spread = dispersion(values)
     inertia, axes = values[INERTIA], wheel_axes(values)
-    torque = np.full(len(axes), values[WHEEL_MAX_TORQUE])
+    inertias, torque, speeds = (
+        of_each_wheel(values, each)[: len(axes)] for each in (WHEEL_INERTIA, WHEEL_MAX_TORQUE, WHEEL_MAX_SPEED)
+    )
     if spread.inertia > 0.0:
         moments, principal = np.linalg.eigh(inertia)
         draws = np.array(normal4(key, Stream.INERTIA, 0, 0)[:3])
@@ -185,4 +187,4 @@ def dispersed_body(values: Values, key: RandomKey, substeps: int = 1) -> RigidBo
         draws = np.array([normal4(key, Stream.WHEEL_LIMIT, 0, i)[0] for i in range(len(torque))])
         torque = torque * np.clip(1.0 + spread.wheel_torque * draws, 0.0, None)
     friction = wheel_friction.dispersed_friction(wheel_friction.parameters(values), key, len(axes))
-    return rigid_body(inertia, axes, values[WHEEL_INERTIA], torque, values[WHEEL_MAX_SPEED], substeps, friction)
+    return rigid_body(inertia, axes, inertias, torque, speeds, substeps, friction)

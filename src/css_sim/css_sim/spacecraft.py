@@ -9,7 +9,7 @@ from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
-from css_common.sections import ROD_AXES, ROD_MAX_DIPOLE, RODS_FITTED
+from css_common.sections import ROD_AXES, RODS_FITTED, rod_max_dipoles
 from css_common.vectors import Vec3, add, cross, multiply
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances
@@ -24,7 +24,7 @@ class Spacecraft(NamedTuple):
     body: RigidBody
     disturbances: Disturbances
     rod_axes_b: np.ndarray  # (M, 3) unit axes of the torque rods; none without rods
-    rod_max_dipole: float  # [A m^2]
+    rod_max_dipoles: np.ndarray  # (M,) [A m^2]
     disturbed: bool  # some disturbance acts
 
 
@@ -36,18 +36,18 @@ def spacecraft(values: Values, key: RandomKey, substeps: int = 1) -> Spacecraft:
         body=dispersed_body(values, key, substeps),
         disturbances=torques._replace(dipole_b=dispersed_dipole(values, key)),
         rod_axes_b=np.ascontiguousarray(axes, dtype=np.float64),
-        rod_max_dipole=values[ROD_MAX_DIPOLE],
+        rod_max_dipoles=rod_max_dipoles(values),
         disturbed=any((torques.gravity_gradient, torques.aerodynamic, torques.solar_pressure, *torques.torque_b))
         or has_dipole(values),
     )
 
 
 @kernel
-def rod_dipole(axes_b, max_dipole: float, command) -> Vec3:
-    """Dipole of all rods in b [A m^2]; commands (M,) beyond a rod's limit are cut, those that are no number are 0."""
+def rod_dipole(axes_b, max_dipoles, command) -> Vec3:
+    """Dipole of all rods in b [A m^2]; commands (M,) beyond limits (M,) are cut, those that are no number are 0."""
     x, y, z = 0.0, 0.0, 0.0
     for i in range(command.shape[0]):
-        m = command[i]
+        m, max_dipole = command[i], max_dipoles[i]
         if not abs(m) <= max_dipole:
             m = max_dipole if m > max_dipole else (-max_dipole if m < -max_dipole else 0.0)
         x += m * axes_b[i, 0]
@@ -89,5 +89,5 @@ def advance(
             torque_b = disturbance_torque(p.disturbances, p.body.inertia, dcm_bn, environment)
         if p.rod_axes_b.shape[0] > 0:
             field_b = multiply(dcm_bn, environment.field_n)
-            torque_b = add(torque_b, cross(rod_dipole(p.rod_axes_b, p.rod_max_dipole, rod_command), field_b))
+            torque_b = add(torque_b, cross(rod_dipole(p.rod_axes_b, p.rod_max_dipoles, rod_command), field_b))
     return propagate(p.body, state, wheel_momentum, wheel_command, torque_b, dt, wheel_torque_out)

@@ -69,9 +69,9 @@ def test_a_residual_dipole_is_a_rod_that_never_changes():
 
 def test_rod_commands_are_limited_and_numbers():
     axes = np.array([[1.0, 0, 0], [0, math.sqrt(0.5), math.sqrt(0.5)]])
-    np.testing.assert_allclose(rod_dipole(axes, 20.0, np.array([5.0, -2.0])), [5.0, -(2**0.5), -(2**0.5)])
-    np.testing.assert_allclose(rod_dipole(axes, 20.0, np.array([-50.0, math.nan])), [-20.0, 0.0, 0.0])
-    np.testing.assert_allclose(rod_dipole(axes, 20.0, np.array([math.inf, 0.0])), [20.0, 0.0, 0.0])
+    np.testing.assert_allclose(rod_dipole(axes, np.full(2, 20.0), np.array([5.0, -2.0])), [5.0, -(2**0.5), -(2**0.5)])
+    np.testing.assert_allclose(rod_dipole(axes, np.full(2, 20.0), np.array([-50.0, math.nan])), [-20.0, 0.0, 0.0])
+    np.testing.assert_allclose(rod_dipole(axes, np.full(2, 20.0), np.array([math.inf, 0.0])), [20.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(

@@ -9,31 +9,58 @@ import numpy as np
 from css_common.component import Finding, Plant, Smoothing
 from css_common.mission import Node
 from css_common.schema import Values
+from css_common.sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
 from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
 from sunpoint_control.wheel_allocation import pseudo_inverse
 
 _ALIKE = 0.01  # relative difference of two low-passes that are one
+_FARTHEST_TURN = 0.5  # [rad] of a reference that spins, between two cycles
 
 
 def control_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
     """What the gains and wheels of a control node do in a mission's graph."""
     values = node.values
     model = loop_model(values, graph)
-    if values.wheels.max_torque == 0.0:
+    if not np.any(of_each_wheel(values, WHEEL_MAX_TORQUE)):
         yield Finding("wheels.max_torque: 0 given, expected a torque above 0: the wheels cannot turn the body")
     turned = np.linalg.matrix_rank(model.authority, tol=1e-6)
     if turned < 3:
         yield Finding(f"wheels_out: the wheels that are left turn the body about {turned} of 3 axes, expected all")
     speeds = pseudo_inverse(np.asarray(values.wheels.axes), values.wheels_out) @ values.dumping.momentum
-    fastest = float(np.max(np.abs(speeds))) / values.wheels.inertia * 30.0 / np.pi
-    if values.dumping.enabled and fastest > values.wheels.max_speed_rpm:
+    rpm = np.abs(speeds) / of_each_wheel(values, WHEEL_INERTIA) * 30.0 / np.pi
+    limits = of_each_wheel(values, WHEEL_MAX_SPEED)
+    worst = int(np.argmax(rpm - limits))
+    fastest = float(rpm[worst])
+    if values.dumping.enabled and fastest > limits[worst]:
         yield Finding(
             f"dumping.momentum: takes {fastest:.0f} rpm of a wheel, expected at most wheels.max_speed_rpm "
-            f"{values.wheels.max_speed_rpm:g}"
+            f"{limits[worst]:g}"
+        )
+    yield from _dumping_findings(values)
+    turned_in_cycle = abs(values.reference.spin_deg_s) * model.period
+    if turned_in_cycle > math.degrees(_FARTHEST_TURN):
+        yield Finding(
+            f"reference.spin_deg_s: {values.reference.spin_deg_s:g} given, {turned_in_cycle:.0f} deg in a cycle of "
+            f"{model.period:g} s, expected at most {math.degrees(_FARTHEST_TURN) / model.period:.3g}: what samples "
+            "once a cycle cannot follow"
         )
     yield from _low_pass_finding(values, model)
     gains = Gains(values.gains.k, values.gains.p, values.gains.ki)
     yield from gain_findings(model, gains, _setting(values, model))
+
+
+def _dumping_findings(values: Values) -> Iterator[Finding]:
+    """Speeds go as Omega_k+1 = (1 - c h) Omega_k: they ring from c h = 1 on, and grow beyond 2."""
+    share = values.dumping.gain * values.mission.period
+    if not values.dumping.enabled or not values.rods.fitted or share < 1.0:
+        return
+    most = 1.0 / values.mission.period
+    yield Finding(
+        f"dumping.gain: {values.dumping.gain:g} given, {share:.3g} of a wheel's momentum in a cycle of "
+        f"{values.mission.period:g} s, expected less than {most:.3g}: "
+        + ("the speeds grow" if share > 2.0 else "the speeds ring"),
+        refused=share > 2.0,
+    )
 
 
 def _low_pass_finding(values: Values, model: LoopModel) -> Iterator[Finding]:

@@ -7,14 +7,9 @@ from typing import NamedTuple
 from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import flag, integer, real
-from css_common.sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE
 from css_common.vectors import Mat3, mat3
 
 _RPM = math.pi / 30.0
-
-
-def _number(value: float) -> float:
-    return 0.0 if math.isnan(value) else float(value)
 
 
 class HealthParameters(NamedTuple):
@@ -92,9 +87,6 @@ class HealthParameters(NamedTuple):
             high=1e5,
         )
     )
-    wheel_inertia: float = computed(lambda values: _number(values[WHEEL_INERTIA]))  # [kg m^2]
-    max_torque: float = computed(lambda values: _number(values[WHEEL_MAX_TORQUE]))  # [N m]
-    max_speed: float = computed(lambda values: _number(values[WHEEL_MAX_SPEED]) * _RPM)  # [rad/s]
     inertia_b: Mat3 = computed(lambda values: mat3(values.spacecraft.inertia))  # [kg m^2]
 
 
@@ -103,12 +95,12 @@ parameters = builder(HealthParameters)
 
 
 @kernel
-def reading_noise(p: HealthParameters) -> float:
-    """1 sigma [N m s] of a momentum that a tachometer reports."""
-    return p.wheel_inertia * p.speed_noise
+def reading_noise(p: HealthParameters, inertia: float) -> float:
+    """1 sigma [N m s] of a momentum that the tachometer of a wheel of some spin inertia [kg m^2] reports."""
+    return inertia * p.speed_noise
 
 
 @kernel
-def beyond_noise(p: HealthParameters) -> float:
+def beyond_noise(p: HealthParameters, inertia: float) -> float:
     """Difference [N m s] of two reported momenta that is none of noise."""
-    return math.sqrt(2.0) * p.sigma * reading_noise(p)
+    return math.sqrt(2.0) * p.sigma * reading_noise(p, inertia)

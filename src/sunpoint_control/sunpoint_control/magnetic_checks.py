@@ -8,18 +8,22 @@ import numpy as np
 
 from css_common.component import Finding, Plant
 from css_common.mission import Node
+from css_common.sections import rod_max_dipoles
 from sunpoint_control.magnetic_control import parameters
 
 _LARGEST_LAG = math.radians(60.0)  # half of the damping is left
 _LARGEST_TILT = math.radians(15.0)  # principal axis to array normal
 _LEAST_RATIO = 1.05  # of the moments about and across the spin axis
 _LARGEST_STEP = 0.2  # share of the rate that one command may take away
+# With the mean rate of the last interval taken for that of now, omega_k+1 = omega_k - s (omega_k + omega_k-1) / 2: the
+# roots of z^2 - (1 - s/2) z + s/2 leave the unit circle where their product s/2 is above 1.
+_UNSTABLE_STEP = 2.0
 
 
 def magnetic_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding]:
     """What is wrong with rods, field and gains of a magnetic control in a mission's graph."""
     values = node.values
-    if values.rods.max_dipole == 0.0:
+    if not np.any(rod_max_dipoles(values)):
         yield Finding("rods.max_dipole: 0 given, expected a dipole above 0: the rods cannot turn the body")
     simulated = any(issubclass(other.component, Plant) for other in graph.values())
     measured = any(output.topic == "mag/field" for other in graph.values() for output in other.outputs)
@@ -46,6 +50,8 @@ def magnetic_findings(node: Node, graph: Mapping[str, Node]) -> Iterator[Finding
         yield Finding(
             f"gains: {max(p.spin.damping_gain, p.spin.spin_gain):.3g} N m s held for {interval:g} s takes "
             f"{share:.2g} of the body rate at a time, expected at most {_LARGEST_STEP:g}"
+            + (f": from {_UNSTABLE_STEP:g} on the rate grows" if share >= _UNSTABLE_STEP else ""),
+            refused=share >= _UNSTABLE_STEP,
         )
     yield from _lag_findings(interval, graph)
 

@@ -178,7 +178,7 @@ def step(
     if since < p.acting_cycles:
         field_b = field_now(motion)
         rod_dipoles(p.rods.axes_b, wanted_b, field_b, dipole_out)
-        rods_saturated = limit_dipoles(p.rods.max_dipole, dipole_out)
+        rods_saturated = limit_dipoles(p.rods.max_dipoles, dipole_out)
         torque_b = rod_torque(p.rods.axes_b, dipole_out, field_b)
     output = ControlOutput(
         torque_b,

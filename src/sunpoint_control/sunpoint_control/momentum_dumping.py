@@ -17,10 +17,9 @@ reduced by one factor, which keeps the sum at zero.
 import math
 from typing import NamedTuple
 
-from css_common.declared import builder, computed, given, made, part, table_of
+from css_common.declared import builder, given, made, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Values, choice, flag, real, reals
-from css_common.sections import WHEEL_INERTIA
+from css_common.schema import choice, flag, real, reals
 from css_common.vectors import Vec3, add, norm, scale, subtract, vector_of
 from sunpoint_control.torque_rods import NO_FIELD, TorqueRods, limit_dipoles, rod_dipoles, rod_torque
 from sunpoint_control.wheel_allocation import AllocationParameters, least_torque, spin_axis
@@ -28,10 +27,6 @@ from sunpoint_control.wheel_allocation import AllocationParameters, least_torque
 ENABLED = flag("dumping.enabled", False, "dump wheel momentum with the torque rods", tunable=True)
 
 _RPM = math.pi / 30.0
-
-
-def _wheel_inertia(values: Values) -> float:
-    return 0.0 if math.isnan(values[WHEEL_INERTIA]) else values[WHEEL_INERTIA]  # asked for where wheels are fitted
 
 
 class DumpingParameters(NamedTuple):
@@ -58,7 +53,6 @@ class DumpingParameters(NamedTuple):
             tunable=True,
         ),
     )
-    wheel_inertia: float = computed(_wheel_inertia)  # [kg m^2]
     rods: TorqueRods = part(TorqueRods)
 
 
@@ -88,14 +82,13 @@ def add_dumping(
         wheel = allocation.wheels[i]
         wanted = add(wanted, scale(_despin_torque(p, wheel, speeds[i]), spin_axis(wheel)))
     rod_dipoles(p.rods.axes_b, wanted, field_b, dipoles)
-    mask = limit_dipoles(p.rods.max_dipole, dipoles)
+    mask = limit_dipoles(p.rods.max_dipoles, dipoles)
     rest = subtract(rod_torque(p.rods.axes_b, dipoles, field_b), wanted)
 
     share = 1.0
-    limit = allocation.max_torque
     for i in range(n):
         u = _despin_torque(p, allocation.wheels[i], speeds[i]) + least_torque(allocation.wheels[i], rest)
-        room = max(limit - (torques[i] if u > 0.0 else -torques[i]), 0.0)
+        room = max(allocation.wheels[i].max_torque - (torques[i] if u > 0.0 else -torques[i]), 0.0)
         if abs(u) > room:
             share = min(share, room / abs(u))
     for i in range(n):
@@ -110,5 +103,5 @@ def add_dumping(
 def _despin_torque(p: DumpingParameters, wheel, speed: float) -> float:
     if wheel.mx == 0.0 and wheel.my == 0.0 and wheel.mz == 0.0:
         return 0.0  # out of service
-    reference = p.reference_speed + least_torque(wheel, p.momentum_b) / p.wheel_inertia
-    return -p.gain * p.wheel_inertia * (speed - reference)
+    reference = p.reference_speed + least_torque(wheel, p.momentum_b) / wheel.inertia
+    return -p.gain * wheel.inertia * (speed - reference)

@@ -85,6 +85,7 @@ def reallocate(wheels, out_of_use: int, tracks, out) -> int:
     for i in range(wheels.shape[0]):
         w, used = wheels[i], out[i]
         used.gx, used.gy, used.gz = w.gx, w.gy, w.gz
+        used.inertia, used.max_torque, used.max_speed = w.inertia, w.max_torque, w.max_speed
         used.mx = used.my = used.mz = 0.0
         if _in_use(w, out_of_use, i):
             x, y, z = multiply(inverse, spin_axis(w))

@@ -164,7 +164,7 @@ def step(
         if p.health.enabled:
             follow_health(p.health, allocation.wheels, memory, dt, wheel_speeds, omega_bn_b, rate_source == _RATE_GYRO)
         speeds_taken(memory, wheel_speeds)
-        momentum_b = wheel_momentum(allocation.wheels, p.dumping.wheel_inertia, memory.speeds, omega_bn_b)
+        momentum_b = wheel_momentum(allocation.wheels, memory.speeds, omega_bn_b)
         if validity != _VALIDITY_NONE:
             sigma_br, error = error_mrp(sun_b, p.pointing.axis_b)
     else:
@@ -173,7 +173,7 @@ def step(
         as_built = False
         isolated = out_of_use(memory)
         spanned = reallocate(p.allocation.wheels, isolated, memory.tracks, memory.allocation)
-        allocation = AllocationParameters(p.allocation.keep_direction, memory.allocation, p.allocation.max_torque)
+        allocation = AllocationParameters(p.allocation.keep_direction, memory.allocation)
     rate_known = inputs_ok and rate_source != _RATE_NONE
     mode_state = next_mode(
         p.modes,

@@ -12,6 +12,7 @@ import numpy as np
 from css_common.declared import computed
 from css_common.kernel import kernel
 from css_common.schema import Values
+from css_common.sections import rod_max_dipoles
 from css_common.vectors import Vec3, axes_across, cross, dot, row, unit
 
 NO_FIELD = 1e-9
@@ -25,15 +26,11 @@ def _axes(values: Values) -> np.ndarray:
     return np.ascontiguousarray(values.rods.axes, dtype=np.float64)
 
 
-def _max_dipole(values: Values) -> float:
-    return float(values.rods.max_dipole)
-
-
 class TorqueRods(NamedTuple):
     """The mission's `rods`."""
 
     axes_b: np.ndarray = computed(_axes)  # (m, 3)
-    max_dipole: float = computed(_max_dipole)  # [A m^2]
+    max_dipoles: np.ndarray = computed(rod_max_dipoles)  # (m,) [A m^2]
 
 
 @kernel
@@ -81,16 +78,16 @@ def rod_torque(rod_axes_b, dipoles, field_b: Vec3) -> Vec3:
 
 
 @kernel
-def limit_dipoles(limit: float, dipoles) -> int:
-    """Scales dipoles together, in place, until none is above the limit: the torque keeps its direction."""
+def limit_dipoles(limits, dipoles) -> int:
+    """Scales dipoles together, in place, until none is above its limit (m,): the torque keeps its direction."""
     mask = 0
-    largest = 0.0
+    k = 1.0
     for j in range(dipoles.shape[0]):
         size = abs(dipoles[j])
-        largest = max(largest, size)
-        if size > limit:
+        if size > limits[j]:
             mask |= 1 << j
+            k = min(k, limits[j] / size)
     if mask != 0:
         for j in range(dipoles.shape[0]):
-            dipoles[j] *= limit / largest
+            dipoles[j] *= k
     return mask

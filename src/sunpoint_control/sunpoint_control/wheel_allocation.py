@@ -15,13 +15,17 @@ import numpy as np
 from css_common.declared import builder, computed, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, integers
-from css_common.sections import WHEEL_AXES, WHEEL_MAX_TORQUE
+from css_common.sections import WHEEL_AXES, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
 from css_common.vectors import Vec3, dot
 
 WHEELS_OUT = integers("wheels_out", (), "-", "indices of wheels out of service, from 0", low=0, high=31, tunable=True)
 
-WHEEL = np.dtype([(name, np.float64) for name in ("gx", "gy", "gz", "mx", "my", "mz")], align=True)
-"""One wheel: unit spin axis in b, and its row of the pseudo-inverse of Gs; zeros: out of service."""
+_FIELDS = ("gx", "gy", "gz", "mx", "my", "mz", "inertia", "max_torque", "max_speed")
+_RPM = math.pi / 30.0  # [rad/s]
+
+WHEEL = np.dtype([(name, np.float64) for name in _FIELDS], align=True)
+"""One wheel: unit spin axis in b, and its row of the pseudo-inverse of Gs; zeros: out of service. Spin inertia
+[kg m^2], largest torque [N m] and speed [rad/s]; 0 where nobody has said."""
 
 
 def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
@@ -38,11 +42,11 @@ def _wheels(values: Values) -> np.ndarray:
     wheels = np.zeros(len(axes_b), WHEEL)
     wheels["gx"], wheels["gy"], wheels["gz"] = axes_b.T
     wheels["mx"], wheels["my"], wheels["mz"] = pseudo_inverse(axes_b, values[WHEELS_OUT]).T
+    # asked for where wheels are fitted
+    wheels["inertia"] = np.nan_to_num(of_each_wheel(values, WHEEL_INERTIA))
+    wheels["max_torque"] = np.nan_to_num(of_each_wheel(values, WHEEL_MAX_TORQUE))
+    wheels["max_speed"] = np.nan_to_num(of_each_wheel(values, WHEEL_MAX_SPEED)) * _RPM
     return wheels
-
-
-def _max_torque(values: Values) -> float:
-    return 0.0 if math.isnan(values[WHEEL_MAX_TORQUE]) else values[WHEEL_MAX_TORQUE]  # asked for where fitted
 
 
 class AllocationParameters(NamedTuple):
@@ -60,7 +64,6 @@ class AllocationParameters(NamedTuple):
     )
     # (n,) of WHEEL: one array, because each one in a parameter costs time at every call
     wheels: np.ndarray = computed(_wheels, WHEELS_OUT)
-    max_torque: float = computed(_max_torque)  # [N m] of each wheel
 
 
 PARAMETERS = table_of(AllocationParameters)
@@ -88,36 +91,34 @@ def allocate(p: AllocationParameters, torque_b: Vec3, out) -> None:
 
 @kernel
 def limit_torques(p: AllocationParameters, torques) -> int:
-    """Brings motor torques (n,) [N m] within the limit, in place; mask of the wheels above it."""
-    limit = p.max_torque
+    """Brings motor torques (n,) [N m] within their limits, in place; mask of the wheels above theirs."""
     mask = 0
-    largest = 0.0
+    k = 1.0
     for i in range(torques.shape[0]):
-        size = abs(torques[i])
-        largest = max(largest, size)
+        size, limit = abs(torques[i]), p.wheels[i].max_torque
         if size > limit:
             mask |= 1 << i
+            k = min(k, limit / size)
     if mask == 0:
         return mask
-    k = limit / largest
     for i in range(torques.shape[0]):
+        limit = p.wheels[i].max_torque
         torques[i] = k * torques[i] if p.keep_direction else min(max(torques[i], -limit), limit)
     return mask
 
 
 @kernel
-def wheel_momentum(wheels, wheel_inertia: float, speeds, omega_bn_b: Vec3) -> Vec3:
+def wheel_momentum(wheels, speeds, omega_bn_b: Vec3) -> Vec3:
     """Gs h_s [N m s], h_i = Js (Omega_i + g_i . omega): momentum of the wheels about their spin axes, in b.
 
     Args:
         wheels: (n,) of `WHEEL`.
-        wheel_inertia: Js [kg m^2].
         speeds: (n,) speeds relative to the body [rad/s].
     """
     x = y = z = 0.0
     for i in range(wheels.shape[0]):
         g = spin_axis(wheels[i])
-        h = wheel_inertia * (speeds[i] + dot(g, omega_bn_b))
+        h = wheels[i].inertia * (speeds[i] + dot(g, omega_bn_b))
         x += h * g[0]
         y += h * g[1]
         z += h * g[2]

@@ -88,17 +88,18 @@ def follow_health(
         begin_health(memory, speeds)
         begin_body_window(b, _before_low_pass(p, before, omega_bn_b, dt), rated)
         return
-    wheels_b = wheel_momentum(wheels, p.wheel_inertia, memory.speeds, omega_bn_b)
+    wheels_b = wheel_momentum(wheels, memory.speeds, omega_bn_b)
     follow_body(b, omega_bn_b, add(multiply(p.inertia_b, omega_bn_b), wheels_b), dt)
     if not rated:
         b.rated = 0
-    noise = reading_noise(p)
-    leap = 2.0 * p.max_torque * dt + beyond_noise(p)
     for i in range(speeds.shape[0]):
-        follow_wheel(memory.tracks[i], p.wheel_inertia, speeds[i], dt, p.max_torque * dt, leap)
+        t, wheel = memory.tracks[i], wheels[i]
+        t.inertia, t.max_torque, t.max_speed = wheel.inertia, wheel.max_torque, wheel.max_speed
+        leap = 2.0 * t.max_torque * dt + beyond_noise(p, t.inertia)
+        follow_wheel(t, t.inertia, speeds[i], dt, t.max_torque * dt, leap)
     if b.time >= max(p.window, _LEAST_CYCLES * dt) * (1.0 - 1e-9):
         raw = _before_low_pass(p, before, omega_bn_b, dt)
-        _judge_all(p, wheels, memory, raw, noise)
+        _judge_all(p, wheels, memory, raw)
         begin_body_window(b, raw, rated)
 
 
@@ -112,7 +113,7 @@ def _before_low_pass(p: HealthParameters, before_b: Vec3, omega_bn_b: Vec3, dt: 
 
 
 @kernel
-def _judge_all(p: HealthParameters, wheels, memory: ControlMemory, omega_bn_b: Vec3, noise: float) -> None:
+def _judge_all(p: HealthParameters, wheels, memory: ControlMemory, omega_bn_b: Vec3) -> None:
     b = memory.body[0]
     n = memory.tracks.shape[0]
     turned = multiply(p.inertia_b, subtract(omega_bn_b, (b.bx, b.by, b.bz)))
@@ -128,6 +129,7 @@ def _judge_all(p: HealthParameters, wheels, memory: ControlMemory, omega_bn_b: V
             sigma = norm(multiply(p.inertia_b, g)) * p.rate_noise
             variance = 2.0 * sigma * sigma + (p.torque_error * norm(turned)) ** 2
             weight = 1.0 / variance if b.rated != 0 else 0.0
+            noise = reading_noise(p, t.inertia)
             judge_wheel(p, memory.verdicts, i, n, t, b.time, b.cycle, dot(rest, g), weight, noise)
         clear_window(t)
 

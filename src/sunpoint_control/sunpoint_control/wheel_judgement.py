@@ -56,12 +56,12 @@ def judge_wheel(
     contradiction = t.moment - expected
     still = abs(t.speed) <= p.sigma * p.speed_noise
     as_friction = still or contradiction * t.speed < 0.0
-    friction = p.friction * p.max_torque * time * (1.0 if as_friction else _IDLE)
-    tolerance = beyond_noise(p) + p.torque_error * t.effort + friction
-    at_limit = abs(t.speed) >= _AT_LIMIT * p.max_speed > 0.0 and expected * t.speed > 0.0
+    friction = p.friction * t.max_torque * time * (1.0 if as_friction else _IDLE)
+    tolerance = beyond_noise(p, t.inertia) + p.torque_error * t.effort + friction
+    at_limit = abs(t.speed) >= _AT_LIMIT * t.max_speed > 0.0 and expected * t.speed > 0.0
     contradicts = abs(contradiction) > tolerance and not at_limit
     agrees = not contradicts and abs(expected) > 2.0 * tolerance
-    beside_noise = abs(contradiction) > beyond_noise(p)
+    beside_noise = abs(contradiction) > beyond_noise(p, t.inertia)
     if t.phase == 0:
         t.drag = contradiction / time if beside_noise else 0.0
     wheel, tachometer = verdicts[i], verdicts[n + i]
@@ -162,8 +162,8 @@ def _look_at_reading(
     p, tachometer, t, time: float, expected: float, contradiction: float, wrong: bool, noise: float
 ) -> None:
     """Believes a tachometer again that has agreed for long enough while its wheel was turned."""
-    biased = tachometer.kind == KIND_BIAS and abs(t.offset) > _least_offset(p)
-    least = beyond_noise(p)
+    biased = tachometer.kind == KIND_BIAS and abs(t.offset) > _least_offset(p, t)
+    least = beyond_noise(p, t.inertia)
     if wrong or biased or t.leaps > 0 or abs(contradiction) > 0.5 * least + _ALIKE * abs(expected):
         t.wait = 0.0
         if tachometer.kind == KIND_BIAS and wrong:
@@ -182,14 +182,14 @@ def _look_at_reading(
 
 
 @kernel
-def _least_offset(p: HealthParameters) -> float:
-    return 2.0 * beyond_noise(p)
+def _least_offset(p: HealthParameters, t) -> float:
+    return 2.0 * beyond_noise(p, t.inertia)
 
 
 @kernel
 def _look_for_offset(p, tachometer, wheel, t, cycle: int, noise: float) -> None:
     """Finds a reading that has jumped and stays beside what it was."""
-    if abs(t.offset) <= _least_offset(p):
+    if abs(t.offset) <= _least_offset(p, t):
         t.offset = 0.0
         t.dwell = 0
         return
@@ -203,6 +203,6 @@ def _look_for_offset(p, tachometer, wheel, t, cycle: int, noise: float) -> None:
             kind,
             EVIDENCE_RANGE,
             abs(t.offset),
-            _least_offset(p),
+            _least_offset(p, t),
             cycle - t.dwell * t.steps,
         )

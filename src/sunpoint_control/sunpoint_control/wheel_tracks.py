@@ -26,6 +26,7 @@ MEMORY = 0.01
 """Share of a cycle in what is of late."""
 
 _FLOATS = (
+    "inertia", "max_torque", "max_speed",  # [kg m^2], [N m], [rad/s] of the wheel
     "speed",  # [rad/s] reported last
     "command",  # [N m] of the cycle that ends
     "model",  # [rad/s] what it is taken to turn at

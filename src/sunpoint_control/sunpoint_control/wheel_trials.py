@@ -39,7 +39,7 @@ _LEAST_GAIN, _MOST_GAIN = 0.25, 4.0
 @kernel
 def own_momentum(p: HealthParameters, time: float, t) -> float:
     """Momentum [N m s] that friction, or a torque of its own, gives in a cycle if it is worth a name."""
-    return 0.5 * p.friction * p.max_torque * time / max(t.steps, 1)
+    return 0.5 * p.friction * t.max_torque * time / max(t.steps, 1)
 
 
 @kernel
@@ -66,8 +66,8 @@ def try_wheel(
     if t.wait <= 0.0:
         t.phase = 1
         # no more than shows a failure: a wheel that gives a multiple must have room for it
-        most = _PUSH * (beyond_noise(p) / time + p.friction * p.max_torque)
-        size = min(most / (1.0 - p.torque_error), p.max_torque)
+        most = _PUSH * (beyond_noise(p, t.inertia) / time + p.friction * t.max_torque)
+        size = min(most / (1.0 - p.torque_error), t.max_torque)
         t.push = size if t.speed >= 0.0 else -size
         clear_sums(t)
 

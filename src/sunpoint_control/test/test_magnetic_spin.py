@@ -62,7 +62,7 @@ def test_kinetic_energy_falls_by_what_shows_across_the_field(omega, b, limit):
     rod_dipoles(RODS, damping_torque(p, tuple(across.tolist())), field_b, dipoles)
     power = dot(rod_torque(RODS, dipoles, field_b), omega)
     assert power == pytest.approx(-p.damping_gain * across @ across, rel=1e-6, abs=1e-15)
-    limit_dipoles(limit, dipoles)
+    limit_dipoles(np.full(3, limit), dipoles)
     assert np.abs(dipoles).max() <= limit * (1.0 + 1e-12)
     assert dot(rod_torque(RODS, dipoles, field_b), omega) <= 1e-18
 

@@ -36,11 +36,11 @@ def dump(p, wheels, speeds, field_b, torques=(0.0, 0.0, 0.0, 0.0)):
 def test_net_torque_on_the_body_is_that_of_the_control_alone(speeds, field_b, control, max_dipole):
     """Also with saturated rods and with wheels near their limit."""
     p, wheels = parameters(rods__max_dipole=max_dipole)
-    control = np.multiply(control, wheels.max_torque / 600.0)
+    control = np.multiply(control, wheels.wheels["max_torque"][0] / 600.0)
     torques, dipoles, _ = dump(p, wheels, speeds, field_b, control)
     on_body = -AXES.T @ torques + np.cross(dipoles, field_b)
     np.testing.assert_allclose(on_body, -AXES.T @ control, atol=1e-15)
-    assert np.abs(torques).max() <= wheels.max_torque * (1.0 + 1e-12)
+    assert np.abs(torques).max() <= wheels.wheels["max_torque"][0] * (1.0 + 1e-12)
     assert np.abs(dipoles).max() <= max_dipole * (1.0 + 1e-12)
 
 
@@ -91,7 +91,7 @@ def test_wheels_come_to_their_reference_speed_under_a_turning_field(reference_rp
         phase = 2.0 * np.pi * t / 5550.0
         field_b = (2e-5 * np.cos(phase), 3e-5 * np.sin(phase), 2e-5 * np.sin(2.0 * phase))
         torques, _, _ = dump(p, wheels, speeds, field_b)
-        speeds = speeds + 5.0 * torques / p.wheel_inertia
+        speeds = speeds + 5.0 * torques / wheels.wheels["inertia"]
     # the common speed of all four wheels carries no momentum and is despun without the rods
     assert np.abs(AXES.T @ (speeds - reference)).max() < 0.01 * start
     assert np.abs(speeds - reference).max() < 2.0
@@ -106,10 +106,10 @@ def test_wheels_come_to_the_momentum_that_they_shall_keep():
         phase = 2.0 * np.pi * t / 5550.0
         field_b = (2e-5 * np.cos(phase), 3e-5 * np.sin(phase), 2e-5 * np.sin(2.0 * phase))
         torques, _, _ = dump(p, wheels, speeds, field_b)
-        speeds = speeds + 5.0 * torques / p.wheel_inertia
+        speeds = speeds + 5.0 * torques / wheels.wheels["inertia"]
     common = 100.0 * np.pi / 30.0
-    np.testing.assert_allclose(p.wheel_inertia * AXES.T @ (speeds - common), bias, atol=0.01 * 0.05)
-    np.testing.assert_allclose(speeds, common + np.linalg.pinv(AXES.T) @ bias / p.wheel_inertia, atol=2.0)
+    np.testing.assert_allclose(wheels.wheels["inertia"] * AXES.T @ (speeds - common), bias, atol=0.01 * 0.05)
+    np.testing.assert_allclose(speeds, common + np.linalg.pinv(AXES.T) @ bias / wheels.wheels["inertia"], atol=2.0)
 
 
 def test_without_field_there_is_no_dumping():
@@ -121,7 +121,7 @@ def test_without_field_there_is_no_dumping():
 
 def test_a_saturated_wheel_leaves_no_room():
     p, wheels = parameters()
-    full = np.full(4, -wheels.max_torque)
+    full = np.full(4, -wheels.wheels["max_torque"][0])
     torques, dipoles, (_, active) = dump(p, wheels, (500.0, 400.0, 300.0, 200.0), (0.0, 3e-5, 2e-5), full)
     np.testing.assert_allclose(torques, full, rtol=1e-12)
     assert not np.any(dipoles)

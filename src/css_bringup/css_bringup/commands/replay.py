@@ -35,6 +35,9 @@ def _parser() -> CommandParser:
     )  # fmt: skip
     parser.add_argument("--mission", metavar="NAME", help="parameters from this mission, not from the recording's own")
     parser.add_argument(
+        "--calibration", type=Path, metavar="FILE", help="what `calibrate` found of the sensors, on top of the mission"
+    )
+    parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter"
     )
     parser.add_argument(

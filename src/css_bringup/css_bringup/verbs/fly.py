@@ -3,6 +3,7 @@
 
 import argparse
 import os
+from collections.abc import Mapping
 
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import read_flight
@@ -49,8 +50,10 @@ def run(arguments: argparse.Namespace) -> int:
     return conclude(mission, result, as_json=arguments.json)
 
 
-def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
-    """Prints a flight's result and turns it into an exit code."""
+def conclude(
+    mission: Mission, result: FlightResult, *, as_json: bool, further: Mapping[str, object] | None = None
+) -> int:
+    """Prints a flight's result and turns it into an exit code; `further` goes into its JSON object."""
     runs: list[Run] = []
     failed = NOTHING_FLOWN
     if result.bag is not None and result.steps > 0:
@@ -81,6 +84,7 @@ def conclude(mission: Mission, result: FlightResult, *, as_json: bool) -> int:
             flight_object(result, runs)
             | {"faults": failed.faults, "detections": failed.objects()}
             | ({} if spinning is None else {"spin": spin_object(spinning)})
+            | dict(further or {})
         )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")

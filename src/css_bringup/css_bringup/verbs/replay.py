@@ -3,6 +3,7 @@
 
 import argparse
 
+from css_analysis.flight_log import FlightLog
 from css_analysis.flight_summary import isolated_lines, summary_table
 from css_bringup.options import complain, console
 from css_bringup.replay_bag import ReplayResult, default_replay, mission_of_bag, replay
@@ -11,6 +12,7 @@ from css_bringup.replay_verdict import is_rounding
 from css_bringup.replayed import Replayed
 from css_bringup.report import print_json
 from css_common.command import FAILED
+from css_common.mission_extends import sections_alone
 from css_common.mission_file import MissionError
 from css_common.progress_lines import still_working
 
@@ -20,6 +22,8 @@ def run(arguments: argparse.Namespace) -> int:
     remap = dict(_remapping(item) for item in arguments.remap)
     requests = [parse_request(text) for text in arguments.estimators]
     mission = mission_of_bag(arguments.bag, remap, arguments.overrides, arguments.mission)
+    if arguments.calibration is not None:
+        mission = mission.with_sections(sections_alone(arguments.calibration))
     out = arguments.out or default_replay(arguments.bag, overwrite=arguments.overwrite)
     with still_working(f"replaying {arguments.bag}"):
         result = replay(
@@ -57,7 +61,7 @@ def print_replay(result: ReplayResult) -> None:
         console.print(line, soft_wrap=True, highlight=False)
     console.print(f"mission: {result.mission.origin}", soft_wrap=True)
     if result.log.imported:
-        console.print("imported telemetry: errors over all lines; of arrays, orbit and shadow nothing is known")
+        console.print(_imported_line(result.log), soft_wrap=True)
     for run in result.replayed:
         for line in _lines(run, result.elsewhere):
             console.print(f"{run.label}: {line}", soft_wrap=True)
@@ -70,6 +74,14 @@ def print_replay(result: ReplayResult) -> None:
     console.print(
         f"{result.messages} estimates in {result.wall_s:.1f} s ({rate:.0f} a CPU second): {result.bag}", soft_wrap=True
     )
+
+
+def _imported_line(log: FlightLog) -> str:
+    """What the errors of imported telemetry are of."""
+    if log.truth is None:
+        return "imported telemetry: it has no truth, so that there are no errors to tell"
+    unknown = [part for part in ("attitude", "rate", "position", "illumination") if not log.knows(part)]
+    return f"imported telemetry: errors over all lines; not known: {', '.join((*unknown, 'solar arrays'))}"
 
 
 def _lines(run: Replayed, elsewhere: str) -> list[str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3
-from css_environment.albedo import Screen, albedo_output
+from css_environment.albedo import albedo_output
 from css_environment.albedo_slope import albedo_slopes
 from css_estimation.sun.cell_layout import CellLayout
 
@@ -31,9 +31,8 @@ def predict_earth_on_cells(layout: CellLayout, dcm_bn: Mat3, light, work, output
         light: (192,) patches of light of the Earth.
         work: (224,) room.
     """
-    screen = Screen(layout.clip_normal_b, 0.0, 0.0)
-    albedo_output(light, layout.cells, screen, layout.cos_half_view, dcm_bn, work, output)
-    albedo_slopes(light, layout.cells, screen, layout.cos_half_view, dcm_bn, slopes)
+    albedo_output(light, layout.cells, layout.screen, layout.cos_half_view, dcm_bn, work, output)
+    albedo_slopes(light, layout.cells, layout.screen, layout.cos_half_view, dcm_bn, slopes)
 
 
 @kernel

@@ -18,7 +18,7 @@ import numpy as np
 from css_common.attitude import mrp_add, mrp_to_dcm, rotation_vector_to_dcm, rotation_vector_to_mrp
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, angle_between, axes_across, cross, dot, matmul, multiply, norm, scale
-from css_environment.albedo import Screen, albedo_output
+from css_environment.albedo import albedo_output
 from css_estimation.attitude.cell_voltages import CellModel
 from css_estimation.attitude.flight_references import References
 from css_estimation.sun.cell_calibration import SCALE
@@ -204,8 +204,7 @@ def _misfit(
     """Sum of the normalised squares by which outputs miss a hypothesis."""
     layout = cells.layout
     if brightness > 0.0:
-        screen = Screen(layout.clip_normal_b, 0.0, 0.0)
-        albedo_output(light, layout.cells, screen, layout.cos_half_view, dcm_bn, work, room)
+        albedo_output(light, layout.cells, layout.screen, layout.cos_half_view, dcm_bn, work, room)
     sun_b = multiply(dcm_bn, references.sun_n)
     sideways_b = cross(along_b, sun_b)
     total = 0.0

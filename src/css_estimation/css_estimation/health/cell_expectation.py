@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot
+from css_environment.albedo import is_blocked
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.sun.cell_layout import cosine_on
+from css_estimation.sun.cell_layout import cosine_on, half_view_of
 from css_estimation.symmetric import Symmetric, product
 
 MOST_SQUARED = 25.0
@@ -56,7 +57,7 @@ def expected(
     cosine = cosine_on(p.layout, i, sun_b)
     spread = _spread((cell.nx, cell.ny, cell.nz), cosine, covariance, p.heading)
     margin = sigmas * math.sqrt(spread)
-    inside = cosine - p.layout.cos_half_view
+    inside = cosine - half_view_of(p.layout, i)
     view = SEEN
     if inside < -margin:
         view = HIDDEN
@@ -71,6 +72,8 @@ def expected(
             view = HIDDEN
         elif above < room:
             view = DOUBTFUL
+    if is_blocked(p.layout.screen, i, sun_b):
+        view = HIDDEN
     if view == HIDDEN:
         return Expected(0.0, 0.0, p.floor, view)
     if p.screened >> i & 1:

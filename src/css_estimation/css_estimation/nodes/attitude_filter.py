@@ -14,6 +14,7 @@ from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.attitude import attitude_ekf, attitude_options, flight_references
 from css_estimation.attitude.flight_references import FlightReferences
+from css_estimation.calibrated_readings import CalibratedReadings
 from css_estimation.messages import attitude_estimate_fields, cells_input, field_reading, gyro_reading
 from css_msgs.msg import AttitudeEstimate
 
@@ -22,7 +23,7 @@ class AttitudeFilter(Component):
     """Attitude and gyro bias by a multiplicative Kalman filter; the Sun as a vector or as voltages (DiGregorio)."""
 
     algorithm: ClassVar[ModuleType] = attitude_ekf
-    shared = ("cells", "orbit", "magnetometer")
+    shared = ("cells", "orbit", "gyro", "magnetometer")
     parameters = merged(attitude_options.PARAMETERS, flight_references.PARAMETERS)
 
     @classmethod
@@ -52,6 +53,7 @@ class AttitudeFilter(Component):
         self._memory = self.algorithm.initial_memory(self._parameters)
         self._step = typed_call(self.algorithm.step)
         self._references = FlightReferences(self.values)
+        self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
 
     def tune(self, values: Values) -> None:
@@ -70,10 +72,10 @@ class AttitudeFilter(Component):
             self._state,
             self._memory,
             since_ns / 1e9,
-            cells.voltages,
-            gyro_b,
+            self._calibrated.cells(cells.voltages),
+            self._calibrated.rate(gyro_b) if gyro_valid else gyro_b,
             gyro_valid,
-            field_b,
+            self._calibrated.field(field_b) if field_valid else field_b,
             field_valid,
             self._references.at((stamp_ns - self.epoch_ns) * 1e-9),
             self._references.light,

@@ -10,6 +10,7 @@ from css_common.kernel import typed_call
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
+from css_estimation.calibrated_readings import CalibratedReadings
 from css_estimation.messages import attitude_estimate_fields
 from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.sun_estimator import aiding_of, inputs_of
@@ -21,7 +22,7 @@ class Earthlight(Component):
     """Attitude by the Sun filter: the Sun is one direction, the light of the Earth on the cells the other."""
 
     algorithm: ClassVar[ModuleType] = earthlight
-    shared = ("cells", "orbit", "magnetometer", "spacecraft", "wheels")
+    shared = ("cells", "orbit", "gyro", "magnetometer", "spacecraft", "wheels")
     parameters = earthlight.PARAMETERS
 
     @classmethod
@@ -46,6 +47,7 @@ class Earthlight(Component):
         self._memory = earthlight.initial_memory(self._parameters)
         self._step = typed_call(earthlight.step)
         self._sky = flight_sky(self.values)
+        self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
 
     def tune(self, values: Values) -> None:
@@ -62,8 +64,8 @@ class Earthlight(Component):
             self._state,
             self._memory,
             since_ns / 1e9,
-            cells.voltages,
-            aiding_of(received, sky_at(self._sky, stamp_ns)),
+            self._calibrated.cells(cells.voltages),
+            aiding_of(received, sky_at(self._sky, stamp_ns), self._calibrated),
         )
         fields = attitude_estimate_fields(solution, self._memory.covariance)
         return {"attitude": self.message("attitude", stamp_ns, **fields)}

@@ -9,7 +9,7 @@ from css_common.run import node_main
 from css_estimation.health import watched
 from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_estimator import SunEstimator
-from css_estimation.sun_filter import sun_filter
+from css_estimation.sun_filter import filter_state, sun_filter
 from css_estimation.sun_filter.calibration_report import Calibrated, calibration_line, calibration_report
 
 
@@ -22,14 +22,14 @@ class SunFilter(SunEstimator):
 
     def configure(self) -> None:
         super().configure()
-        self._mode = sun_filter.MODE_WAITING
+        self._mode = filter_state.MODE_WAITING
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         outgoing = super().cycle(stamp_ns, received)
         estimate = outgoing["estimate"]
         assert isinstance(estimate, Sample)  # no output of events
         before, self._mode = self._mode, estimate.mode
-        if before == sun_filter.MODE_EARTH and self._mode == sun_filter.MODE_COASTING:
+        if before == filter_state.MODE_EARTH and self._mode == sun_filter.MODE_COASTING:
             report = self.calibration()
             if report:
                 self.report(calibration_line(report))

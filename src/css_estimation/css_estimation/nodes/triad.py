@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Attitude of a spinning body from slits and magnetometer."""
+"""Attitude from the Sun, seen by the slits of a spinning body or by cells, and the magnetometer."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -16,14 +16,27 @@ from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
-from css_estimation.attitude import flight_references, sun_field_attitude
-from css_estimation.attitude.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN
-from css_estimation.messages import field_reading
+from css_estimation.attitude import cell_sun, flight_references, sun_field_attitude
+from css_estimation.attitude.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN, SunFieldAttitude
+from css_estimation.messages import cells_input, field_reading
 from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
 
 _ORDERS = {"best": ORDER_BEST, "sun": ORDER_SUN, "field": ORDER_FIELD}
 _PRIMARY = choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; best: that with the smaller covariance")
+
+
+_SUN_SOURCE = choice(
+    "sun_source",
+    "auto",
+    ("auto", "slits", "cells"),
+    "what sees the Sun: slits at each passage, or the lit cells at each stamp; auto: cells where the mission has some",
+)
+
+
+def _is_by_cells(values: Values) -> bool:
+    source = values[_SUN_SOURCE]
+    return source == "cells" or (source == "auto" and len(values.cells.normals) > 0)
 
 
 class _Sighting(NamedTuple):
@@ -42,22 +55,18 @@ class _FieldSample(NamedTuple):
 class Triad(Component):
     """Attitude at each passage of the Sun, from its direction and the field at the same instant (TRIAD).
 
-    The field is interpolated between samples, so an attitude goes out two samples after its instant: it is that of
-    `delay` before the stamp. References are the Sun's ephemeris and IGRF at the flight's position.
+    Of cells it is that of each stamp at which lit cells tell the Sun. Of slits the field is interpolated between
+    samples, so an attitude goes out two samples after its instant: it is that of `delay` before the stamp. References
+    are the Sun's ephemeris and IGRF at the flight's position.
     """
 
-    shared = ("orbit", "magnetometer")
-    parameters = (
-        flight_references.FIELD_DEGREE,
-        _PRIMARY,
-    )
+    shared = ("orbit", "magnetometer", "cells")
+    parameters = (flight_references.FIELD_DEGREE, _PRIMARY, _SUN_SOURCE, *cell_sun.PARAMETERS)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
-        return (
-            Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle),
-            field_input(values, required=True),
-        )
+        sun = cells_input(values) if _is_by_cells(values) else Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle)
+        return (sun, field_input(values, required=True))
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
@@ -65,12 +74,13 @@ class Triad(Component):
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
-        return needed_of_orbit(values)
+        cells = ("cells.normals",) if _is_by_cells(values) else ()
+        return (*cells, *needed_of_orbit(values))
 
     @classmethod
     def conflicts(cls, values: Values) -> Iterable[str]:
         sampling = values.mission.period * values.magnetometer.divider
-        if sampling > 0.05:
+        if not _is_by_cells(values) and sampling > 0.05:
             yield (
                 f"magnetometer.divider: a sample every {sampling:g} s given, expected at most 0.05 s: the field of a "
                 "spinning body is interpolated"
@@ -86,6 +96,7 @@ class Triad(Component):
         self._sightings: deque[_Sighting] = deque(maxlen=64)
         self._newest: dict[str, Any] | None = None
         self._instant_ns = 0
+        self._cell_sun = cell_sun.CellSun(self.values) if _is_by_cells(self.values) else None
         self._attitude = typed_call(sun_field_attitude.sun_field_attitude)
         self._interpolated = typed_call(sun_field_attitude.interpolated_field)
         self._variance = typed_call(sun_field_attitude.interpolated_variance)
@@ -99,6 +110,26 @@ class Triad(Component):
         self._quaternion(attitude.dcm_bn)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
+        fresh = self._by_slits(stamp_ns, received) if self._cell_sun is None else self._by_cells(stamp_ns, received)
+        return {"attitude": self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))}
+
+    def _by_cells(self, stamp_ns: int, received: Received) -> bool:
+        """The attitude of a stamp at which field and cells tell one; True when they do."""
+        cells, field = received["cells"], received["field"]
+        assert cells is not None and self._cell_sun is not None  # required inputs
+        field_b, valid = field_reading(field)
+        if field is None or not valid:
+            return False
+        at = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
+        seen = self._cell_sun.seen(cells.voltages, field_b, at)
+        if seen is None:
+            return False
+        # a covariance of zeros is one that nobody knows
+        variance = max(float(field.magnetic_field_covariance[0]), self._cell_sun.field_variance)
+        attitude = self._attitude(seen.sun_b, seen.covariance, field_b, variance, at.sun_n, at.field_n, self._order)
+        return self._take(attitude, stamp_ns, 0.0, seen.mask)
+
+    def _by_slits(self, stamp_ns: int, received: Received) -> bool:
         angle = received["angle"]
         assert angle is not None  # a required input
         if received["field"] is not None:
@@ -111,8 +142,7 @@ class Triad(Component):
             covariance = (c[0], c[1], c[2], c[4], c[5], c[8])
             instant_ns = stamp_ns - round(angle.age * 1e9)
             self._sightings.append(_Sighting(instant_ns, vector_of(angle.sun_b), covariance, angle.rate))
-        fresh = self._settle(stamp_ns)
-        return {"attitude": self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))}
+        return self._settle(stamp_ns)
 
     def _settle(self, stamp_ns: int) -> bool:
         """The attitude of the oldest sighting whose field is known by now; True when there is a new one."""
@@ -140,19 +170,23 @@ class Triad(Component):
         attitude = self._attitude(
             sighting.sun_b, sighting.covariance, field_b, variance, at.sun_n, at.field_n, self._order
         )
+        return self._take(attitude, sighting.instant_ns, sighting.rate, 0)
+
+    def _take(self, attitude: SunFieldAttitude, instant_ns: int, rate: float, lit_mask: int) -> bool:
+        """Makes an attitude the newest one, unless there is none."""
         if attitude.mode == MODE_NONE:
             return False
         xx, xy, xz, yy, yz, zz = attitude.covariance
         covariance = np.zeros((6, 6))
         covariance[:3, :3] = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
-        self._instant_ns = sighting.instant_ns
+        self._instant_ns = instant_ns
         self._newest = {
             "q_bn": np.array(self._quaternion(attitude.dcm_bn)),
-            "omega_bn_b": np.array((0.0, 0.0, sighting.rate)),
+            "omega_bn_b": np.array((0.0, 0.0, rate)),
             "gyro_bias_b": np.zeros(3),
             "covariance": covariance.ravel(),
             "nis": attitude.nis,
-            "lit_mask": 0,
+            "lit_mask": lit_mask,
             "nis_dof": 1,
             "used": AttitudeEstimate.USED_FIELD | AttitudeEstimate.USED_SUN,
             "mode": attitude.mode,

@@ -9,8 +9,16 @@ import numpy as np
 from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
+from css_environment.albedo import Screen, is_blocked, plane_screen, view_cosine, with_views
 from css_estimation.symmetric import Symmetric, product
-from css_sensors.cells import IN_PLANE, half_view_cosine, plane_sides
+from css_sensors.cells import (
+    IN_PLANE,
+    blocked_directions,
+    half_view_cosine,
+    known_normals,
+    own_view_cosines,
+    plane_sides,
+)
 
 READABLE = 2.0
 """From it on a number is no reading of a cell, 1 being the Sun at normal incidence.
@@ -28,16 +36,24 @@ class CellLayout(NamedTuple):
 
     cells: np.ndarray  # (N,) of CELL: one array, because each one in a parameter costs time at every call
     clip_normal_b: Vec3  # [-] normal of the plane that hides the other half space; zeros: none
-    cos_half_view: float  # [-] cosine of half the view cone
+    cos_half_view: float  # [-] cosine of half the view cone, the widest where they differ
+    screen: Screen  # the plane again, with views of single cells and what structure blocks
 
 
 def cell_layout(values: Values) -> CellLayout:
     """Layout of the mission's `cells` section."""
-    normals_b = np.asarray(values.cells.normals, dtype=np.float64)
+    normals_b = known_normals(values)
     cells = np.zeros(len(normals_b), CELL)
     cells["nx"], cells["ny"], cells["nz"] = normals_b.T
     cells["side"] = plane_sides(values)
-    return CellLayout(cells, vector_of(values.cells.clip_normal), half_view_cosine(values))
+    screen = with_views(plane_screen(values.cells.clip_normal), own_view_cosines(values), blocked_directions(values))
+    return CellLayout(cells, vector_of(values.cells.clip_normal), half_view_cosine(values), screen)
+
+
+@kernel
+def half_view_of(layout: CellLayout, i: int) -> float:
+    """Cosine of half the view cone of cell `i`."""
+    return view_cosine(layout.screen, i, layout.cos_half_view)
 
 
 @kernel
@@ -48,7 +64,7 @@ def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
     (O'Keefe & Schaub 2013, Fig. 1).
     """
     cell, d = layout.cells[i], direction_b
-    if cell.nx * d[0] + cell.ny * d[1] + cell.nz * d[2] < layout.cos_half_view:
+    if cell.nx * d[0] + cell.ny * d[1] + cell.nz * d[2] < half_view_of(layout, i) or is_blocked(layout.screen, i, d):
         return False
     if cell.side == 0.0:
         return True
@@ -60,12 +76,14 @@ def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
 def share_view(layout: CellLayout, i: int, mask: int) -> bool:
     """Whether there are directions that cell `i` sees in common with each cell in `mask`, taken one by one."""
     cell = layout.cells[i]
-    half = max(layout.cos_half_view, 0.0)
-    # cosine of the whole view: normals further apart have cones without a common direction
-    apart = 2.0 * half * half - 1.0 + IN_PLANE
+    half = max(half_view_of(layout, i), 0.0)
     for j in range(layout.cells.shape[0]):
         if mask >> j & 1:
-            other = layout.cells[j]
+            other, half_j = layout.cells[j], max(half_view_of(layout, j), 0.0)
+            # cosine of both half views together: normals further apart have cones without a common direction
+            apart = 2.0 * half * half - 1.0 + IN_PLANE
+            if half_j != half:
+                apart = half * half_j - math.sqrt((1.0 - half * half) * (1.0 - half_j * half_j)) + IN_PLANE
             if cell.nx * other.nx + cell.ny * other.ny + cell.nz * other.nz <= apart or cell.side * other.side < 0.0:
                 return False
     return True
@@ -121,7 +139,7 @@ def informs(
         return True
     if sees(layout, i, predicted_b):
         return not (missing != 0 and is_opposed(layout, i, missing))
-    return lit and cosine_on(layout, i, predicted_b) > layout.cos_half_view - margin
+    return lit and cosine_on(layout, i, predicted_b) > half_view_of(layout, i) - margin
 
 
 @kernel

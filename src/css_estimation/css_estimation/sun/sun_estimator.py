@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A Sun estimator as a component of the graph; a node file only names the algorithm."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import ClassVar
 
 import numpy as np
@@ -14,6 +14,7 @@ from css_common.message_columns import Columns
 from css_common.schema import Table, Values
 from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
+from css_estimation.calibrated_readings import CalibratedReadings
 from css_estimation.health import watched
 from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
@@ -57,41 +58,51 @@ def _low_pass_gain(values: Values) -> float:
     return low_pass_gain.py_func(values[RATE_CUTOFF], values[PERIOD]) if RATE_CUTOFF in values else 1.0
 
 
-def aiding_of(received: Received, sky: Sky) -> Aiding:
+def aiding_of(received: Received, sky: Sky, calibrated: CalibratedReadings) -> Aiding:
     """What an algorithm is given beside the cells, of the inputs of one stamp."""
+    gyro_b, gyro_valid = gyro_reading(received.get("gyro"))
+    field_b, field_valid = field_reading(received.get("field"))
     wheels = received.get("wheels")
     return Aiding(
-        *gyro_reading(received.get("gyro")),
-        *field_reading(received.get("field")),
+        calibrated.rate(gyro_b) if gyro_valid else gyro_b,
+        gyro_valid,
+        calibrated.field(field_b) if field_valid else field_b,
+        field_valid,
         _NO_SPEEDS if wheels is None else wheels.speed,
         wheels is not None,
         sky,
     )
 
 
-def measured_in(steps: Cycles) -> Measured | None:
+def measured_in(steps: Cycles, calibrated: CalibratedReadings) -> Measured | None:
     """What an algorithm is given beside the models at many steps; None when wheels are silent at some of them alone."""
     count = len(steps.stamps_ns)
     speeds = steps.spread("wheels", "speed")
     if speeds is not None and not speeds[1].all():
         return None
+    rates_b, rates_valid = _vectors(steps, "gyro", "angular_velocity", calibrated.rates)
+    fields_b, fields_valid = _vectors(steps, "field", "magnetic_field", calibrated.fields)
     return Measured(
-        steps.columns["cells"].voltages,
-        *_vectors(steps, "gyro", "angular_velocity"),
-        *_vectors(steps, "field", "magnetic_field"),
+        calibrated.cells(steps.columns["cells"].voltages),
+        rates_b,
+        rates_valid,
+        fields_b,
+        fields_valid,
         np.zeros((count, 0)) if speeds is None else speeds[0],
         speeds is not None,
     )
 
 
-def _vectors(steps: Cycles, key: str, field: str) -> tuple[np.ndarray, np.ndarray]:
+def _vectors(
+    steps: Cycles, key: str, field: str, corrected: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     """The vectors (M, 3) of an input, zero where it measured none, and whether it did (M,); as `gyro_reading`."""
     given, variances = steps.spread(key, field), steps.spread(key, f"{field}_covariance")
     if given is None or variances is None:
         return np.zeros((len(steps.stamps_ns), 3)), np.zeros(len(steps.stamps_ns), np.bool_)
     (vectors, there), (covariance, _) = given, variances
     valid = there & (covariance[:, 0] != -1.0)
-    return np.where(valid[:, np.newaxis], vectors, 0.0), valid
+    return np.where(valid[:, np.newaxis], corrected(vectors), 0.0), valid
 
 
 class SunEstimator(Component):
@@ -102,7 +113,7 @@ class SunEstimator(Component):
         mode_names: names of its modes, if changes between them are worth a line in the log.
     """
 
-    shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "magnetometer")
+    shared: ClassVar[tuple[str, ...]] = ("cells", "orbit", "gyro", "magnetometer")
     algorithm: ClassVar[SunAlgorithm]
     mode_names: ClassVar[Mapping[int, str]] = {}
 
@@ -148,6 +159,7 @@ class SunEstimator(Component):
             self._step = typed_call(cycle_of(self.algorithm.step.__module__))
         else:
             self._step = watched.stepped_by(self.algorithm.step)
+        self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
         self._sky = flight_sky(self.values)
@@ -163,7 +175,7 @@ class SunEstimator(Component):
         from css_estimation.sun.heading_loop import loop_of, new_headings
         from css_estimation.sun.sky_table import sky_table
 
-        measured = measured_in(steps)
+        measured = measured_in(steps, self._calibrated)
         if measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
             return None
         stamps = steps.stamps_ns
@@ -189,13 +201,13 @@ class SunEstimator(Component):
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
-        aiding = aiding_of(received, sky_at(self._sky, stamp_ns))
+        aiding = aiding_of(received, sky_at(self._sky, stamp_ns), self._calibrated)
         self._state, heading = self._step(
             self._parameters,
             self._state,
             self._memory,
             since_ns / 1e9,
-            cells.voltages,
+            self._calibrated.cells(cells.voltages),
             aiding,
         )
         self._tell(stamp_ns, heading.mode)

@@ -47,6 +47,8 @@ from css_estimation.sun.sun_heading import (
 from css_estimation.sun.sun_rate import rate_from_sun_vectors
 
 _LONGEST_STEP = 1e9  # [s]
+# Stamps are whole nanoseconds. What is divided by a far shorter step overflows.
+_SHORTEST_STEP = 1e-12  # [s]
 
 RATE_CUTOFF = real("rate.cutoff", 0.1, "Hz", "corner of the first-order low-pass on the rate", low=0.0, high=1e3)
 USE_GYRO = flag("use_gyro", True, "use the gyro while it delivers; off: rates from Sun vectors", tunable=True)
@@ -121,7 +123,7 @@ def initial_state() -> TrackingState:
 @kernel
 def elapsed(dt: float) -> float:
     """The step [s], 0 for one that is negative, absurd or no number: time that cannot be trusted has not passed."""
-    return dt if 0.0 < dt < _LONGEST_STEP else 0.0
+    return dt if _SHORTEST_STEP <= dt < _LONGEST_STEP else 0.0
 
 
 @kernel

@@ -18,7 +18,7 @@ from css_common.declared import builder, given, part, table_of
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, norm, scale
 from css_estimation.sun import sun_tracking
-from css_estimation.sun.cell_layout import CellLayout, brightest
+from css_estimation.sun.cell_layout import CellLayout, brightest, half_view_of
 from css_estimation.sun.lit_cells import CELL_SIGMA, Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_algorithm import no_memory
@@ -90,7 +90,7 @@ def single_cell_covariance(layout: CellLayout, i: int, output: float, cell_sigma
     """
     cell = layout.cells[i]
     normal_b = (cell.nx, cell.ny, cell.nz)
-    cosine = max(min(output, 1.0) - cell_sigma, layout.cos_half_view, 0.0)
+    cosine = max(min(output, 1.0) - cell_sigma, half_view_of(layout, i), 0.0)
     variance = 0.5 * (1.0 - cosine * cosine)
     return row_major(constrain(normal_b, normal_b, isotropic(variance), _LARGEST_VARIANCE)[1])
 

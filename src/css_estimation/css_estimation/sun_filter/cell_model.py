@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, add, cross, dot, multiply, multiply_transposed, scale
+from css_environment.albedo import is_blocked, view_cosine
 from css_estimation.sun_filter.calibration import PER_CELL, calibrated, first_state
 from css_estimation.sun_filter.memory import (
     COMMON,
@@ -91,13 +92,14 @@ def view_of(p: SunFilterParameters, i: int, sun_b: Vec3, margin: float) -> tuple
     """Cosine of the Sun on cell i, whether it sees the Sun, and whether that is in doubt within a margin of cosines."""
     cell = p.cells[i]
     cosine = cell.nx * sun_b[0] + cell.ny * sun_b[1] + cell.nz * sun_b[2]
-    seen = cosine >= p.cos_half_view
-    doubtful = p.cos_half_view > _SMALLEST_STEP and abs(cosine - p.cos_half_view) < margin
+    edge = view_cosine(p.screen, i, p.cos_half_view)
+    seen = cosine >= edge and not is_blocked(p.screen, i, sun_b)
+    doubtful = edge > _SMALLEST_STEP and abs(cosine - edge) < margin
     if cell.side != 0.0:
         above = dot(p.screen.axis_b, sun_b) * (1.0 if cell.side > 0.0 else -1.0)
         seen = seen and above > 0.0
         if cosine > _SMALLEST_STEP and abs(above) < margin:
-            doubtful = cosine > p.cos_half_view - margin
+            doubtful = cosine > edge - margin
         elif above < 0.0:
             doubtful = False
     return cosine, seen, doubtful
@@ -152,6 +154,7 @@ def cell_model(
     cell, dcm_bn = p.cells[i], dcm_of(x)
     sun_b = multiply(dcm_bn, sun_n)
     cosine, seen, doubtful = view_of(p, i, sun_b, margin)
+    edge = view_cosine(p.screen, i, p.cos_half_view)
     gain, normal_b, by_tilt1, by_tilt2 = cell.gain, (cell.nx, cell.ny, cell.nz), 0.0, 0.0
     calibrates = p.calibration.per_cell > 0
     if calibrates:
@@ -163,14 +166,14 @@ def cell_model(
     albedo = earth_factor * mean_light if earth_known else 0.5 * p.earth.unknown
     if doubtful:
         # the reading tells on which side of the edge the Sun is, where no Earth could
-        sunlight = flux * max(cosine, p.cos_half_view)
+        sunlight = flux * max(cosine, edge)
         seen = sunlight > p.earth.largest and v > gain * scale_now * (albedo + 0.5 * sunlight)
         if not seen:
             return _unused(COUNTED, -1.0)
     # normals in n turn with the error, d(n) = theta x n
     across = cross(multiply_transposed(dcm_bn, normal_b), sun_n)
     sunlit, share, spread = max(cosine, 0.0), (1.0 if seen else 0.0), 0.0
-    if p.cos_half_view < _SMALLEST_STEP and cell.side == 0.0:
+    if edge < _SMALLEST_STEP and cell.side == 0.0 and not is_blocked(p.screen, i, sun_b):
         sunlit, share, spread = rising(cosine, _EDGE * quadratic(covariance, THETA, across) + _ROUNDING)
         seen = share > _HARDLY
     cloud = p.earth.clouds * mean_light

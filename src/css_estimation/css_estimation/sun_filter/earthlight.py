@@ -24,11 +24,12 @@ from css_estimation.attitude.attitude_solution import (
 )
 from css_estimation.sun.sun_heading import Aiding
 from css_estimation.sun_filter import options, sun_filter
+from css_estimation.sun_filter.filter_state import MODE_EARTH, SunFilterState
 from css_estimation.sun_filter.hypotheses import the_only_one
 from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, SunFilterMemory, attitude_block, dcm_of, triple
 from css_estimation.sun_filter.motion import RATE_BY_GYRO
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.sun_filter.sun_filter import MODE_EARTH, SunFilterState, knows_earth
+from css_estimation.sun_filter.sun_filter import knows_earth
 
 PARAMETERS = options.PARAMETERS
 conflicts = options.conflicts

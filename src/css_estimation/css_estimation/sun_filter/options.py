@@ -10,15 +10,25 @@ import numpy as np
 from css_common.conversions import square
 from css_common.declared import computed, given, made, merged, part, table_of
 from css_common.schema import Values, choice, flag, real, reals
+from css_common.sections import WHEEL_INERTIA, of_each_wheel
 from css_common.vectors import Mat3, mat3
-from css_environment.albedo import Screen, plane_screen
+from css_environment.albedo import Screen, plane_screen, with_views
 from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import EclipseParameters
 from css_estimation.sun.flight_sky import USE_FIELD
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
 from css_estimation.sun_filter import calibration_options
 from css_estimation.sun_filter.calibration_options import Calibration, lasting_error
-from css_sensors.cells import half_view_cosine, plane_sides
+from css_sensors.cells import (
+    MEASURED_DARKS,
+    MEASURED_NORMALS,
+    MEASURED_SCALES,
+    blocked_directions,
+    half_view_cosine,
+    known_normals,
+    own_view_cosines,
+    plane_sides,
+)
 
 CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
 """One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
@@ -45,7 +55,7 @@ USE_WHEELS = flag("use_wheels", True, "without gyro, take the rate from angular 
 
 def _cells(values: Values) -> np.ndarray:
     """(N,) of CELL."""
-    nominal = np.asarray(values.cells.normals, dtype=np.float64).reshape(-1, 3)
+    nominal = known_normals(values)
     cells = np.zeros(len(nominal), CELL)
     measured = np.asarray(values[NORMALS], dtype=np.float64).reshape(-1, 3) if len(values[NORMALS]) else nominal
     cells["nx"], cells["ny"], cells["nz"] = (measured / np.linalg.norm(measured, axis=1, keepdims=True)).T
@@ -57,7 +67,7 @@ def _cells(values: Values) -> np.ndarray:
 
 
 def _screen(values: Values) -> Screen:
-    return plane_screen(values.cells.clip_normal)
+    return with_views(plane_screen(values.cells.clip_normal), own_view_cosines(values), blocked_directions(values))
 
 
 def _table(values: Values) -> np.ndarray:
@@ -67,7 +77,7 @@ def _table(values: Values) -> np.ndarray:
 def _wheels(values: Values) -> np.ndarray:
     axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
     wheels = np.zeros(len(axes), WHEEL)
-    wheels["hx"], wheels["hy"], wheels["hz"] = values.wheels.inertia * axes.T
+    wheels["hx"], wheels["hy"], wheels["hz"] = of_each_wheel(values, WHEEL_INERTIA) * axes.T
     return wheels
 
 
@@ -85,7 +95,7 @@ def _inertia(values: Values) -> Mat3:
         return mat3(np.eye(3))
     axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
     body = np.asarray(values.spacecraft.inertia, dtype=np.float64).reshape(3, 3)
-    return mat3(body + (values.wheels.inertia * axes.T @ axes if values.wheels.fitted else 0.0))
+    return mat3(body + (of_each_wheel(values, WHEEL_INERTIA) * axes.T @ axes if values.wheels.fitted else 0.0))
 
 
 def _anisotropy(values: Values) -> float:
@@ -313,6 +323,9 @@ def conflicts(values: Values) -> Iterator[str]:
         yield f"{GAINS.name}: {np.min(values[GAINS]):g} given, expected gains above 0; a dead cell is left out as NaN"
     if len(values[NORMALS]) and np.any(np.linalg.norm(np.reshape(values[NORMALS], (-1, 3)), axis=1) < _NO_NORMAL):
         yield f"{NORMALS.name}: a row of zeros given, expected normals"
+    for parameter, measured in ((GAINS, MEASURED_SCALES), (DARKS, MEASURED_DARKS), (NORMALS, MEASURED_NORMALS)):
+        if len(values[parameter]) and len(values[measured]):
+            yield f"{parameter.name}: given together with {measured.name}, expected one of the two"
     if values[calibration_options.MODE] == "estimate" and not flight_sky.knows_place(values):
         yield (
             f"{calibration_options.MODE.name}: estimate given, but the place in orbit is not known, and the light of "

@@ -20,8 +20,16 @@ _EXAMPLES = (
     "okeefe_2013 --cases 100 --sweep css_array.scale_cell_error=0,0.05,0.1,0.2",
     "okeefe_2013 --cases 10000 --scheduler tcp://cluster:8786",
     "cubesat_vmm --cases 200 --guess 20",
+    "okeefe_2013 --cases 64 --disperse dynamics.spacecraft.inertia=normal:0.05 --sampling lhs",
+    "okeefe_2013 --cases 64 --disperse css_array.noise=uniform:0:0.02 --sensitivity",
+    "okeefe_2013 --cases 64 --disperse css_array.noise=uniform:0:0.02 --worst heading_error_mean_deg",
 )
 _NOTES = """\
+Distributions of --disperse: normal:S, lognormal:S and uniform:R about the mission's value, in shares of it;
+normal:MEAN:S, normal:MEAN:S:LOW:HIGH, uniform:LOW:HIGH and choice:A:B:... in the parameter's unit. KEY.3 is one number
+of a list, KEY.each every number by itself. A mission keeps them in its section `dispersions`. What a shared parameter
+such as spacecraft.inertia draws, flight software knows too; dynamics.spacecraft.inertia is the truth alone.
+
 Results are Parquet files in the study's folder: cases.parquet (one row per configuration and case) and
 percentiles.parquet (percentiles over the cases against time), beside study.json, what was asked for."""
 
@@ -54,6 +62,43 @@ def _parser() -> CommandParser:
         default=[],
         metavar="KEY=V1,V2,...",
         help="fly every value of a parameter; several sweeps combine",
+    )
+    add(
+        "--disperse",
+        action="append",
+        default=[],
+        metavar="KEY=DISTRIBUTION",
+        help="draw a parameter for each case, for instance spacecraft.inertia=normal:0.05",
+    )
+    add(
+        "--sampling",
+        choices=("random", "lhs", "sobol"),
+        help="draw dispersed parameters independently, by a Latin hypercube or a Sobol sequence (default: the "
+        "mission's, else random)",
+    )
+    add(
+        "--sensitivity",
+        nargs="?",
+        const="",
+        metavar="QUANTITY",
+        help="print Sobol indices: which dispersed parameter matters for a column of cases.parquet (default: the first "
+        "that is printed). --cases are then base points (rounded up to a power of 2), each flown once for every "
+        "dispersion and three times more",
+    )
+    add(
+        "--worst",
+        nargs="?",
+        const="",
+        metavar="QUANTITY",
+        help="search for the worst flight, by the largest value of a column of cases.parquet (default: the first that "
+        "is printed), and print what flies it",
+    )
+    add(
+        "--worst-flights",
+        type=int,
+        default=400,
+        metavar="N",
+        help="flights of that search (default: %(default)s)",
     )
     add("--sample", type=float, default=1.0, metavar="S", help="time between percentiles [s] (default: %(default)s)")
     add(

@@ -4,25 +4,27 @@
 import argparse
 import itertools
 import json
-import re
 import sys
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
 
-from css_analysis.quantities import Summary
-from css_analysis.readable_table import ReadableTable
 from css_common import places
+from css_common.command import INTERRUPTED
+from css_common.dispersions import SECTION
 from css_common.mission import Mission, load_mission
+from css_common.sampling import design_size
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.mission_parts import measured_estimators
-from css_monte_carlo.progress import progress_bar
+from css_monte_carlo.progress import CaseProgress, progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
+from css_monte_carlo.sensitivity import sensitivities
 from css_monte_carlo.study import Configuration, Study, run_study
 from css_monte_carlo.study_criteria import judge, refuse_unknown_criteria
-from css_monte_carlo.study_summary import study_object, summaries_of
+from css_monte_carlo.study_summary import study_object
+from css_monte_carlo.study_tables import print_sensitivity, print_study, print_worst
+from css_monte_carlo.worst_case import Worst, find_worst
 
 
 def run(options: argparse.Namespace) -> int:
@@ -33,7 +35,8 @@ def run(options: argparse.Namespace) -> int:
         overrides.append(f"mission.duration={options.duration}")
     if options.seed is not None:
         overrides.append(f"mission.seed={options.seed}")
-    mission = load_mission(options.mission, overrides)
+    overrides += [f"{SECTION}{text}" for text in options.disperse]
+    mission, cases = _sampled(load_mission(options.mission, overrides), options)
     configurations = _configurations(mission, options)
     if mission.values.measures.required_share > 0.0:
         refuse_unknown_criteria(mission)
@@ -47,7 +50,7 @@ def run(options: argparse.Namespace) -> int:
         study = run_study(
             mission,
             configurations,
-            options.cases,
+            cases,
             folder,
             first_case=options.first_case,
             sample_s=options.sample,
@@ -56,8 +59,16 @@ def run(options: argparse.Namespace) -> int:
             progress=lambda done, total: bar.tell(part, done, total),
             scheduler=DaskScheduler(options.scheduler) if options.scheduler else None,
         )
-    result = study_object(study, time.perf_counter() - begin, time.process_time())
+        result = study_object(study, time.perf_counter() - begin, time.process_time())
+        worst = _worst_flights(mission, configurations, study, options, bar)
     print_study(study, result, Console(highlight=False))
+    if options.sensitivity is not None:
+        indices = sensitivities(study, options.sensitivity)
+        print_sensitivity(indices, Console(highlight=False))
+        result["sensitivity"] = [one.as_object() for one in indices]
+    if worst:
+        print_worst(worst, Console(highlight=False))
+        result["worst"] = [one.as_object() for one in worst]
     judged = judge(study)
     for line in itertools.chain.from_iterable(configuration.lines() for configuration in judged):
         print(line)
@@ -65,7 +76,57 @@ def run(options: argparse.Namespace) -> int:
         result["criteria"] = [configuration.as_object() for configuration in judged]
     if options.json:
         print(json.dumps(result, allow_nan=False))
+    if any(one.interrupted for one in worst):
+        return INTERRUPTED
     return 0 if all(configuration.passed for configuration in judged) else 1
+
+
+def _sampled(mission: Mission, options: argparse.Namespace) -> tuple[Mission, int]:
+    """The mission with the design that its dispersed parameters are drawn by, and the cases that this takes."""
+    wants = [f"--{name}" for name in ("sampling", "sensitivity") if getattr(options, name) is not None]
+    if wants and not mission.dispersions:
+        raise StudyError(f"{wants[0]}: the mission disperses nothing, expected --disperse or a section dispersions")
+    if options.sensitivity is not None:
+        if options.sampling is not None or options.first_case:
+            raise StudyError("--sensitivity: draws by a design of its own, expected no --sampling and no --first-case")
+        base = 1 << (options.cases - 1).bit_length()
+        mission = mission.with_overrides(["sampling.method=saltelli", f"sampling.cases={base}"])
+        return mission, design_size(mission.dispersions, mission.values.sampling)
+    if options.sampling is not None:
+        mission = mission.with_overrides([f"sampling.method={options.sampling}"])
+    last = options.first_case + options.cases
+    method, size = mission.values.sampling.method, design_size(mission.dispersions, mission.values.sampling)
+    if method == "lhs" and (size == 0 or options.sampling is not None):
+        return mission.with_overrides([f"sampling.cases={last}"]), options.cases
+    if mission.dispersions and method in ("lhs", "saltelli") and last > size:
+        raise StudyError(f"--cases: case {last - 1} asked for, but sampling.cases of the mission gives {size} cases")
+    if mission.dispersions and method == "sobol" and options.cases & (options.cases - 1):
+        print(
+            f"monte-carlo: {options.cases} cases are no power of 2, which a Sobol sequence fills best", file=sys.stderr
+        )
+    return mission, options.cases
+
+
+def _worst_flights(
+    mission: Mission, configurations: list[Configuration], study: Study, options: argparse.Namespace, bar: CaseProgress
+) -> list[Worst]:
+    found: list[Worst] = []
+    for configuration in configurations if options.worst is not None else ():
+        part = bar.add(f"worst case of {configuration.estimator}")
+        found.append(
+            find_worst(
+                mission,
+                configuration,
+                study,
+                options.worst_flights,
+                options.worst,
+                threads=options.threads,
+                progress=lambda done, total, part=part: bar.tell(part, done, total),  # type: ignore[misc]
+            )
+        )
+        if found[-1].interrupted:
+            break
+    return found
 
 
 def _refuse_bad_numbers(options: argparse.Namespace) -> None:
@@ -73,6 +134,7 @@ def _refuse_bad_numbers(options: argparse.Namespace) -> None:
         ("--cases", options.cases, 1, "at least 1"),
         ("--first-case", options.first_case, 0, "at least 0"),
         ("--threads", options.threads, 1, "at least 1"),
+        ("--worst-flights", options.worst_flights, 1, "at least 1"),
     )
     for name, value, least, expected in limits:
         if value is not None and value < least:
@@ -106,40 +168,3 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
 
 def _default_folder(mission: str) -> Path:
     return places.results("studies") / f"{mission}_{time.strftime('%Y%m%d_%H%M%S')}"
-
-
-def print_study(study: Study, result: dict, console: Console) -> None:
-    """A table of the configurations of each kind, the values of a sweep below each other, and where the files are."""
-    rows = result["configurations"]
-    for columns in dict.fromkeys(summaries_of(study, row["estimator"]) for row in rows):
-        console.print(_study_table([row for row in rows if summaries_of(study, row["estimator"]) == columns], columns))
-    if study.flown:
-        console.print(
-            f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "
-            f"{result['cpu_s']:.1f} s CPU: {result['cpu_ns_per_case_step']:.0f} ns a case and step"
-        )
-    else:
-        console.print("this study was complete; nothing was flown")
-    console.print(f"study: {study.folder}", soft_wrap=True)
-
-
-def _study_table(rows: Sequence[dict], columns: Sequence[Summary]) -> ReadableTable:
-    table = ReadableTable()
-    table.add_name("estimator")
-    table.add_number("gyro")
-    for key in _swept(rows[0]):
-        table.add_number(re.sub(r"(?<=[._])", "\n", key))
-    for column in columns:
-        table.add_number(column.title)
-    # configurations go point by point; what one estimator makes of a sweep is read down a column
-    kinds = list(dict.fromkeys((row["estimator"], row["gyro"]) for row in rows))
-    for row in sorted(rows, key=lambda row: kinds.index((row["estimator"], row["gyro"]))):
-        figures = ["-" if row[c.name] is None else c.form.format(row[c.name]) for c in columns]
-        table.add_texts([row["estimator"], row["gyro"], *_swept(row).values(), *figures])
-    return table
-
-
-def _swept(row: dict) -> dict[str, str]:
-    """Values of a configuration by the keys that are swept."""
-    pairs = (override.partition("=") for override in row["overrides"])
-    return {key: value for key, _, value in pairs}

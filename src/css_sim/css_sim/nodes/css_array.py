@@ -23,7 +23,16 @@ from css_environment.ephemeris import segment_start
 from css_environment.moving_clouds import CLOUD_STEP_NS, reflect
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_sensors.cells import LARGEST_READING, NORMALS, SMALLEST_READING
-from css_sim import cell_errors, cell_faults, cell_screen, earth_reflectivity, failing, latency, sun_cells
+from css_sim import (
+    cell_errors,
+    cell_faults,
+    cell_response,
+    cell_screen,
+    earth_reflectivity,
+    failing,
+    latency,
+    sun_cells,
+)
 from css_sim.delayed import Delayed
 from css_sim.failing import Failing, fault_outputs
 from css_sim.sensing import CellsOfCase, sense_cells
@@ -69,8 +78,11 @@ class CssArray(Component):
     def conflicts(cls, values: Values) -> Iterable[str]:
         yield from cell_faults.conflicts(values)
         yield from cell_screen.conflicts(values)
+        yield from cell_response.conflicts(values)
         yield from earth_reflectivity.conflicts(values)
         yield from latency.conflicts(values)
+        if len(values[cell_response.ANGLES]) and sun_cells.parameters(values).warp:
+            yield "warp: true given together with response.angles_deg, expected false: the table is the whole response"
         if values[OUTPUT_LOW] >= values[OUTPUT_HIGH]:
             yield f"output_low: {values[OUTPUT_LOW]:g} given, expected less than output_high"
         # estimators would take for missing what these cells put out

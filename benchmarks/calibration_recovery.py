@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cells with scale errors of 5 to 20 % and tilts of 3 deg, calibrated by simulated flights.
+
+How often the true values lie within the stated error, and how headings err before, after, and with cells that are known
+exactly. The scale error of a case is normal with 5, 10, 15 or 20 %, in turn. The first two thirds of a flight
+calibrate, headings are measured on the last third. The last line is a JSON object; the exit code is 1 when fewer than 99 % of the
+parameters lie within three of their standard deviations, or when the mean heading error of `ekf` after calibration is
+more than 10 % above that with known cells.
+
+    python benchmarks/calibration_recovery.py --cases 200 --reference truth
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import argparse
+import json
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from uncalibrated import (
+    Flown,
+    flown,
+    heading_errors,
+    measured,
+    mission_of,
+    sun_alone,
+    true_common,
+    true_parameters,
+    without_truth,
+)
+
+from css_calibration.calibration import Calibration, calibrate
+from css_calibration.cell_fit_model import normals_of
+from css_calibration.errors import CalibrationError
+from css_calibration.recorded import Recorded
+
+_SCALES = (0.05, 0.10, 0.15, 0.20)
+_PART = 2.0 / 3.0
+_RECORDINGS = {"truth": lambda flight: flight.recorded, "batch": without_truth, "sun": sun_alone}
+_SIGMAS = 3.0
+_ESTIMATORS = ("ekf", "sun_filter")  # the first is the one that is judged
+_NAMES = ("scale", "dark", "tilt 1", "tilt 2")
+
+
+def first_part(recorded: Recorded) -> Recorded:
+    """What calibrates."""
+    return recorded.at(np.flatnonzero(recorded.time < _PART * recorded.time[-1]))
+
+
+def ratios(flight: Flown, c: Calibration) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 4) errors over standard deviations, NaN where not observed; and of gyro and magnetometer."""
+    off = (c.fit.parameters - true_parameters(flight.mission)) / np.where(c.sigma > 0.0, c.sigma, 1.0)
+    of_cells = np.where(c.observed, off, np.nan)[:, :4]
+    true = true_common(flight.mission)
+    common = c.common()
+    if common is not None:
+        return of_cells, (common[0] - true) / common[1]
+    aids = [(b.x - t) / b.sigma for b, t in ((c.bias, true[:3]), (c.field, true[3:])) if b is not None]
+    return of_cells, np.concatenate(aids) if aids else np.zeros(0)
+
+
+def headings(flight: Flown, c: Calibration, estimator: str) -> list[float]:
+    """Mean heading errors [deg] of an estimator on the last part: nominal, calibrated, known cells."""
+    after_s = _PART * flight.recorded.time[-1]
+    nominal = c.data.normals_b
+    unit = ["sun_filter.response.scale=1.0"]
+    found = measured(flight, c.parameters, normals_of(nominal, c.parameters))
+    true = true_parameters(flight.mission)
+    known = measured(flight, true, normals_of(nominal, true))
+    if estimator != "sun_filter":
+        unit = []
+    runs = ([], found + unit, known + unit)
+    errors = [np.degrees(heading_errors(flight, estimator, overrides, after_s)) for overrides in runs]
+    return [float(e.mean()) if len(e) else float("nan") for e in errors]
+
+
+def main() -> int:
+    """Runs the cases and prints what they came to."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--cases", type=int, default=200)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--reference", choices=tuple(_RECORDINGS), default="truth")
+    options = parser.parse_args()
+    began, cells, aids, errors, refused = time.monotonic(), [], [], [], 0
+    for case in range(options.first, options.first + options.cases):
+        scale = _SCALES[case % len(_SCALES)]
+        flight = flown(mission_of(f"mission.case={case}", f"css_array.scale_cell_error={scale}"))
+        recorded = first_part(_RECORDINGS[options.reference](flight))
+        asked = "batch" if options.reference == "batch" else "truth"
+        try:
+            c = calibrate(recorded, reference=asked, curve="okeefe", holdout=0.0)
+        except CalibrationError as error:
+            print(f"case {case}: {error}", flush=True)
+            refused += 1
+            continue
+        of_cells, of_aids = ratios(flight, c)
+        cells.append(of_cells)
+        aids.append(of_aids)
+        errors.append([headings(flight, c, name) for name in _ESTIMATORS])
+        worst = np.nanmax(np.abs(of_cells)) if np.isfinite(of_cells).any() else float("nan")
+        shown = "; ".join(" ".join(f"{e:.3f}" for e in row) for row in errors[-1])
+        told, wall_s = np.isfinite(of_cells).mean(), time.monotonic() - began
+        print(
+            f"case {case}: observed {told:.2f}, worst {worst:.2f} sigma, heading {shown} deg, {wall_s:.0f} s",
+            flush=True,
+        )
+    return _verdict(options.reference, np.array(cells), np.array(aids), np.array(errors), refused)
+
+
+def _verdict(reference: str, cells: np.ndarray, aids: np.ndarray, errors: np.ndarray, refused: int) -> int:
+    told = np.abs(cells[np.isfinite(cells)])
+    within = float(np.mean(told <= _SIGMAS))
+    case_within = np.array([np.nanmax(np.abs(case)) <= _SIGMAS for case in cells if np.isfinite(case).any()])
+    whole = errors[np.isfinite(errors).all(axis=(1, 2))]
+    mean = whole.mean(axis=0)
+    over = mean[:, 1] / mean[:, 2]
+    result = {
+        "reference": reference,
+        "cases": len(cells),
+        "refused": refused,
+        "parameters_told": len(told),
+        "share_told": float(np.isfinite(cells).mean()),
+        "share_within_3_sigma": within,
+        "share_of_cases_with_all_within_3_sigma": float(case_within.mean()),
+        "rms_over_sigma": {n: float(np.sqrt(np.nanmean(cells[:, :, k] ** 2))) for k, n in enumerate(_NAMES)},
+        "aids_within_3_sigma": float(np.mean(np.abs(aids) <= _SIGMAS)) if aids.size else None,
+        "heading_cases": len(whole),
+        "heading_deg": {
+            name: {"before": b, "after": a, "known": k, "after_over_known": a / k}
+            for name, (b, a, k) in zip(_ESTIMATORS, mean.tolist(), strict=True)
+        },
+    }
+    print(json.dumps(result))
+    return 0 if within >= 0.99 and float(over[0]) <= 1.1 else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Batch least squares over a whole recording: cells; without a truth attitude, gyro and magnetometer as well.
+
+Three passes of `scipy.optimize.least_squares`, all derivatives in closed form. The first has a soft-L1 loss, so that
+outliers do not lead it astray; then the noise is read off the residuals, what is beyond 5 sigma is left out and named,
+and the loss is square. In the last pass the Earth shines on the normals found.
+
+The variance of an output is white noise, an error relative to the output, and clouds on the light of the Earth. The
+covariance of the result is that of the estimator under errors as they are: relative ones as alike in all cells as the
+residuals are, clouds that last for two minutes, an Earth that nobody predicts for all of the recording; scaled by what
+the sums of residuals over such stretches are above expectation (Huber's sandwich, with a model of the middle).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from css_calibration.attitude_track import Track
+from css_calibration.cell_data import CellData
+from css_calibration.cell_fit_model import EARTH, PER_CELL
+from css_calibration.noise_model import Noise, noise_of, slow_factor
+from css_calibration.unknowns import Unknowns
+
+OUTLIER = 5.0
+"""Standard deviations beyond which an output is left out."""
+_SOFT = 2.0
+_PASSES = 2  # with a square loss
+_TOLERANCE = 1e-6
+
+
+@dataclass
+class Fit:
+    """What a batch came to.
+
+    Attributes:
+        unknowns: what was looked for.
+        x: (P,) in units of ignorance: of the cells, then of the track.
+        covariance: (P, P) of it.
+        information: (P, P) normal matrix of the data alone.
+        residuals: (M, N) of the outputs [-], NaN where they do not count.
+        outliers: (M, N) left out.
+        noise: of the outputs.
+        slow: factor on the standard deviations by residuals that last.
+        cost: half the sum of squares.
+    """
+
+    unknowns: Unknowns
+    x: np.ndarray
+    covariance: np.ndarray
+    information: np.ndarray
+    residuals: np.ndarray
+    outliers: np.ndarray
+    noise: Noise
+    slow: float
+    cost: float
+
+    @property
+    def parameters(self) -> np.ndarray:
+        """(N, 5) of the cells."""
+        return self.unknowns.parameters(self.x)[0]
+
+    @property
+    def earth(self) -> float:
+        """Brightness of the Earth relative to the mean one."""
+        return self.unknowns.parameters(self.x)[1]
+
+
+class _Problem:
+    """Residuals and derivatives for given weights."""
+
+    def __init__(
+        self, data: CellData, unknowns: Unknowns, track: Track | None, counts: np.ndarray, noise: Noise
+    ) -> None:
+        self.data, self.unknowns, self.track = data, unknowns, track
+        self.rows, self.cells = np.nonzero(counts)
+        self.noise = noise
+        self.sigma = np.ones(len(self.rows))
+        self._columns = unknowns.column_of()
+
+    def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return x[: self.unknowns.count], x[self.unknowns.count :]
+
+    def weigh(self, x: np.ndarray) -> None:
+        """Standard deviations by what is expected at `x`."""
+        parameters, earth = self.unknowns.parameters(x)
+        out, slopes, _ = self._placed(x)[0].predicted(parameters, earth)
+        self.sigma = np.sqrt(self.noise.variance(out, slopes[:, :, EARTH], parameters))[self.rows, self.cells]
+
+    def _placed(self, x: np.ndarray) -> tuple[CellData, np.ndarray | None, np.ndarray | None]:
+        if self.track is None:
+            return self.data, None, None
+        dcm_bn, e = self.track.attitudes(self.split(x)[1])
+        self.data.sun_b = np.ascontiguousarray(np.einsum("kij,kj->ki", dcm_bn, self.track.sun_n))
+        return self.data, dcm_bn, e
+
+    def residuals(self, x: np.ndarray) -> np.ndarray:
+        data, dcm_bn, e = self._placed(x)
+        out, _, _ = data.predicted(*self.unknowns.parameters(x))
+        off = (out - data.voltages)[self.rows, self.cells] / self.sigma
+        parts = [off]
+        if self.track is not None:
+            assert dcm_bn is not None and e is not None
+            of_track = self.split(x)[1]
+            parts += [self.track.field(of_track, dcm_bn, e)[0], self.track.links(of_track)[0]]
+        return np.concatenate([*parts, x])
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        return np.vstack([self.of_data(x), np.eye(len(x))])
+
+    def of_data(self, x: np.ndarray) -> np.ndarray:
+        """Derivatives of all but what was known before."""
+        data, dcm_bn, e = self._placed(x)
+        _, slopes, turns = data.predicted(*self.unknowns.parameters(x))
+        count = self.unknowns.count
+        out = np.zeros((len(self.rows), len(x)))
+        at = np.arange(len(self.rows))
+        scale = self.unknowns.sigma
+        for k in range(PER_CELL):
+            column = self._columns[self.cells, k]
+            there = column >= 0
+            out[at[there], column[there]] = (slopes[self.rows, self.cells, k])[there] * scale[column[there]]
+        if self.unknowns.earth:
+            out[:, count - 1] = slopes[self.rows, self.cells, EARTH] * scale[-1]
+        if self.track is None:
+            return out / self.sigma[:, None]
+        assert dcm_bn is not None and e is not None
+        part = self.track._rows(self.rows)
+        out[:, count:] = part.by_unknowns(e[self.rows], self.track.sun_n[self.rows], turns[self.rows, self.cells])
+        of_track = self.split(x)[1]
+        _, field = self.track.field(of_track, dcm_bn, e)
+        _, links = self.track.links(of_track)
+        below = np.zeros((len(field) + len(links), len(x)))
+        below[:, count:] = np.vstack([field, links])
+        return np.vstack([out / self.sigma[:, None], below])
+
+
+def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: np.ndarray | None = None) -> Fit:
+    """The batch.
+
+    Args:
+        data: of a recording; where a track is given, its Sun vectors are renewed by it.
+        unknowns: of the cells.
+        track: attitudes that are sought as well.
+        start: first guess of all unknowns; None: as the mission has them.
+    """
+    size = unknowns.count + (0 if track is None else track.count)
+    x = np.zeros(size) if start is None else start
+    counts = data.usable.copy()
+    outliers = np.zeros_like(counts)
+    noise = Noise(0.02, 0.02, 0.0, 0.3 if data.earth_known else 0.0)
+    for number in range(_PASSES + 1):
+        problem = _Problem(data, unknowns, track, counts & ~outliers, noise)
+        problem.weigh(x)
+        result = least_squares(
+            problem.residuals, x, jac=problem.jacobian, loss="soft_l1" if number == 0 else "linear",
+            f_scale=_SOFT, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=1e-9, max_nfev=40,
+            x_scale="jac" if track is None else 1.0,
+        )  # fmt: skip
+        x = result.x
+        off, expected, earthly, parameters = _off(problem, x, counts)
+        noise = noise_of(off, expected, earthly, counts & ~outliers, data.earth_known)
+        if number < _PASSES:
+            sigma = np.sqrt(noise.variance(expected, earthly, parameters))
+            outliers = counts & (np.abs(off) > OUTLIER * sigma)
+    problem = _Problem(data, unknowns, track, counts & ~outliers, noise)
+    problem.weigh(x)
+    covariance, information, slow = _covariance(problem, x, off, expected, earthly, parameters)
+    return Fit(
+        unknowns, x, covariance, information, np.where(counts, -off, np.nan), outliers, noise, slow, float(result.cost)
+    )
+
+
+def _off(problem: _Problem, x: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Expected less read (M, N), what was expected, its slope by the Earth, and parameters (N, 5)."""
+    parameters, earth = problem.unknowns.parameters(x)
+    data = problem._placed(x)[0]
+    out, slopes, _ = data.predicted(parameters, earth)
+    return np.where(counts, out - data.voltages, 0.0), out, slopes[:, :, EARTH], parameters
+
+
+def _covariance(
+    problem: _Problem, x: np.ndarray, off: np.ndarray, expected: np.ndarray, earthly: np.ndarray, parameters: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    jacobian = problem.of_data(x)
+    information = jacobian.T @ jacobian
+    count = len(problem.rows)
+    of_cells = jacobian[:count]
+    noise, rows, cells = problem.noise, problem.rows, problem.cells
+    sigma = problem.sigma
+    others = jacobian[count:]
+    middle = others.T @ others + np.eye(len(x))
+    white = noise.white / sigma
+    middle_cells = (of_cells * white[:, None] ** 2).T @ of_cells
+    relative = noise.relative * np.abs(expected[rows, cells]) / sigma
+    middle_cells += (1.0 - noise.alike) * (of_cells * relative[:, None] ** 2).T @ of_cells
+    middle_cells += noise.alike * _outer(of_cells * relative[:, None], rows)
+    stretch = np.floor(problem.data.time / noise.lasting_s).astype(np.int64)[rows] * problem.data.voltages.shape[1]
+    clouds = noise.clouds * np.abs(earthly[rows, cells]) / sigma
+    middle_cells += _outer(of_cells * clouds[:, None], stretch + cells)
+    if noise.unknown > 0.0:
+        middle_cells += _outer(of_cells * (noise.unknown / sigma)[:, None], cells)
+    slow = slow_factor(noise, problem.data.time, rows, cells, off, expected, earthly)
+    inverse = np.linalg.inv(information + np.eye(len(x)))
+    covariance = inverse @ (middle + slow**2 * middle_cells) @ inverse
+    return covariance, information, slow
+
+
+def _outer(weighted: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Sum over groups of the outer products of the sums of their rows."""
+    _, place = np.unique(groups, return_inverse=True)
+    sums = np.zeros((int(place.max(initial=-1)) + 1, weighted.shape[1]))
+    np.add.at(sums, place, weighted)
+    return sums.T @ sums
+
+
+def root_mean_square(values: np.ndarray) -> float:
+    """Of the finite ones; 0 without any."""
+    finite = values[np.isfinite(values)]
+    return math.sqrt(float(np.mean(finite**2))) if len(finite) else 0.0

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Missions that `new` writes: every template passes the checks, acquires the Sun, and says what was assumed."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from css_common.command import USAGE
+from css_common.mission import load_mission, mission_from_text
+from css_common.preflight import preflight
+from css_design.commands import new
+from css_design.errors import DesignError
+from css_design.new_mission.commented import Entry, number_word, parameter_file
+from css_design.new_mission.gains import gain_margin_db
+from css_design.new_mission.new_mission import new_mission, read_items
+from css_design.new_mission.questions import ask
+from css_design.new_mission.templates import TEMPLATES
+from css_monte_carlo.study import Configuration, run_study
+from sunpoint_control.control_checks import loop_model
+from sunpoint_control.loop_stability import Gains
+
+
+def made(template, name="mine", **given):
+    return new_mission(name, *read_items(given, template))
+
+
+@pytest.mark.parametrize("template", TEMPLATES)
+def test_every_template_passes_every_check(template):
+    mission = made(template)
+    assert mission.warnings == ()
+    again = mission_from_text(mission.text, "mine.yaml")
+    assert preflight(again) == []
+    assert np.allclose(again.values.spacecraft.inertia, mission.design.inertia, rtol=1e-5, atol=1e-12)
+    assert again.values.orbit.inclination_deg == pytest.approx(97.40, abs=0.01)
+    if mission.design.loop is not None:
+        control = again.node("mrp_control")
+        model = loop_model(control.values, {node.name: node for node in again.nodes})
+        gains = Gains(control.values.gains.k, control.values.gains.p, control.values.gains.ki)
+        assert gain_margin_db(model, gains) == pytest.approx(mission.design.loop.margin_db, abs=0.1)
+
+
+@pytest.mark.parametrize("template", ["1u", "3u", "6u"])
+def test_six_faces_acquire_the_sun(template, tmp_path):
+    """From a tumble in any attitude: all of a few cases are on the Sun after ten minutes, and stay."""
+    # in sunlight from the start: a quarter of the orbit after the node at 10:30
+    mission = made(template).mission.with_overrides(["mission.duration=1200", "orbit.true_anomaly_deg=90"])
+    study = run_study(mission, [Configuration("sun_filter", True)], 3, tmp_path / "study")
+    acquired = np.array(study.cases["acquired_s"].to_pylist(), dtype=float)
+    pointing = np.array(study.cases["pointing_error_mean_deg"].to_pylist(), dtype=float)
+    assert np.all(acquired < 600.0) and np.all(pointing < 30.0), (acquired, pointing)
+
+
+def test_a_spacecraft_without_gyro_or_wheels_gets_what_it_needs():
+    rods = made("3u-rods")
+    names = {node.name for node in rods.mission.nodes}
+    assert "magnetic_control" in names and "gyro" not in names
+    gyroless = made("3u", gyro="none")
+    assert gyroless.design.estimator == "sun_filter"
+    assert "gyro" not in {node.name for node in gyroless.mission.nodes}
+
+
+def test_numbers_of_the_file_are_those_asked_for(tmp_path):
+    path = tmp_path / "mine.yaml"
+    arguments = ["mine", "--inertia", "0.05,0.04,0.02", "--cells", "+x,-x,+y,-y,+z,-z,1/0/1", "--wheels", "4",
+                 "--wheel-momentum", "0.02", "--wheel-speed", "5000", "--gyro", "0.02", "--tip-off", "2",
+                 "--array-normal=-z", "--orbit", "elements 600 51.6 30", "--epoch", "2027-03-01", "--cell-noise",
+                 "0.02", "--out", str(path)]  # fmt: skip
+    assert new.main(arguments) == 0
+    mission = load_mission(str(path))
+    values = mission.values
+    assert np.array_equal(values.spacecraft.inertia, np.diag([0.05, 0.04, 0.02]))
+    assert np.array_equal(values.spacecraft.array_normal, (0.0, 0.0, -1.0))
+    assert len(values.cells.normals) == 7 and len(values.wheels.axes) == 4
+    assert values.wheels.inertia * 5000 * 2 * math.pi / 60 == pytest.approx(0.02, rel=1e-5)
+    assert values.orbit.altitude == 600e3 and values.orbit.raan_deg == 30.0
+    assert mission.node("gyro").values.noise_deg_s == 0.02
+    assert mission.node("css_array").values.noise == 0.02
+    assert mission.node("dynamics").values.initial.rate_deg_s == 2.0
+    text = path.read_text()
+    assert "[assumed]" in text.split("bits:")[1].splitlines()[0]
+    assert "[assumed]" not in text.split("max_speed_rpm:")[1].splitlines()[0]
+
+
+WRONG = [
+    (["--mass", "-1"], "--mass: '-1' given, expected a number from"),
+    (["--mass", "nan"], "--mass: 'nan' given"),
+    (["--size", "1,1"], "--size: '1,1' given, expected 3 numbers"),
+    (["--wheels", "5"], "--wheels: '5' given, expected one of 3, 4, none"),
+    (["--wheels", "none", "--rods", "none"], "nothing turns the body"),
+    (["--wheels", "none", "--magnetometer", "none"], "steered by the measured field"),
+    (["--inertia", "1,1,5"], "no rigid body has these"),
+    (["--inertia", "1,2,0,0,1,0,0,0,1"], "--inertia: not symmetric"),
+    (["--tip-off", "60"], "expected at most 10.9 deg/s: the wheels take 0.01 N m s"),
+    (["--cells", "+x,foo"], "--cells: 'foo' given, expected a face"),
+    (["--array-normal", "up"], "--array-normal: 'up' given, expected a face"),
+    (["--orbit", "tle nowhere.tle"], "--orbit: nowhere.tle: cannot be read"),
+    (["--epoch", "2060-01-01"], "mission.epoch: 2060-01-01T00:00:00Z given"),
+    (["--template", "9u"], "--template: '9u' given, expected one of 1u, 3u"),
+    (["--out", "mine.txt"], "--out: mine.txt given, expected a file that ends in .yaml"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "words"), WRONG, ids=lambda value: " ".join(value)[:30])
+def test_what_is_wrong_is_one_line_and_no_file(arguments, words, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert new.main(["mine", *arguments]) == USAGE
+    (line,) = capsys.readouterr().err.splitlines()
+    assert words in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_names_and_files_are_guarded(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in ("a/b", "", "mine.yaml", "."):
+        assert new.main([name]) == USAGE
+    (tmp_path / "mine.yaml").write_text("precious")
+    assert new.main(["mine"]) == USAGE
+    assert (tmp_path / "mine.yaml").read_text() == "precious"
+    assert new.main(["mine", "--overwrite"]) == 0
+    assert "precious" not in (tmp_path / "mine.yaml").read_text()
+    assert "is there already" in capsys.readouterr().err
+
+
+def test_json_and_list(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert new.main(["--list"]) == 0
+    assert set(TEMPLATES) == {line.split()[0] for line in capsys.readouterr().out.splitlines()}
+    assert new.main(["mine", "--wheels", "4", "--json"]) == 0
+    told = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert told["gains"]["gain_margin_db"] >= 12.0 and told["gains"]["bandwidth_hz"] > 0.0
+    assert "wheels" not in told["assumed"] and "mass" in told["assumed"]
+
+
+def test_doubtful_designs_are_written_with_a_warning(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert new.main(["mine", "--cells", "+x"]) == 1
+    told = capsys.readouterr()
+    assert "no cell sees 50.0 % of the sky" in told.err and (tmp_path / "mine.yaml").exists()
+
+
+class Dialogue:
+    """Answers questions by the name in the prompt."""
+
+    def __init__(self, answers):
+        self.answers, self.said, self.asked = {name: list(given) for name, given in answers.items()}, [], []
+
+    def read_line(self, prompt):
+        name = prompt.strip().partition(" (")[0].partition(" [")[0]
+        self.asked.append(name)
+        given = self.answers.get(name, [])
+        return given.pop(0) if given else ""
+
+
+def test_questions_have_units_and_defaults_and_are_asked_again_after_nonsense():
+    talk = Dialogue({"mass": ["heavy", "2.5"], "wheels": ["none"]})
+    answers = ask({"orbit": "sso 600 06:00"}, "3u", talk.read_line, talk.said.append)
+    assert answers == {"mass": "2.5", "wheels": "none"}
+    assert talk.asked.count("mass") == 2 and "orbit" not in talk.asked
+    assert "wheel momentum" not in talk.asked  # of wheels that are not there
+    assert any("expected a number from" in line for line in talk.said)
+    assert any("[kg]" in line for line in talk.said)
+
+
+def test_nothing_is_asked_when_nobody_can_answer(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("builtins.input", lambda prompt: pytest.fail("asked"))
+    assert new.main(["mine"]) == 0
+
+
+def test_answers_that_end_early_are_an_error(tmp_path, monkeypatch, capsys):
+    def ends(prompt):
+        raise EOFError
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    monkeypatch.setattr("builtins.input", ends)
+    assert new.main(["mine"]) == USAGE
+    assert "the answers ended" in capsys.readouterr().err
+    assert new.main(["mine", "--yes"]) == 0
+
+
+def test_numbers_are_written_as_ros_reads_them():
+    numbers = {1.0: "1.0", 1e-6: "1.0e-06", -0.0: "0.0", 123456.5: "123456.5", 1e20: "1.0e+20"}
+    assert {value: number_word(value) for value in numbers} == numbers
+    text = parameter_file("A heading.", [("/**", [Entry("mission.name", "it's", "word"), Entry("mission.seed", 1)])])
+    assert text == '# A heading.\n/**:\n  ros__parameters:\n    mission:\n      name: "it\'s"  # word\n      seed: 1\n'
+
+
+def test_a_template_that_is_not_there():
+    with pytest.raises(DesignError, match="--template"):
+        read_items({}, "none")

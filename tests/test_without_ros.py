@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Analysis where there is no ROS: no verb of it asks for ROS, and each leaves the same bytes as with it."""
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+from listing import ROOT
+from without_ros import packages_laid_out, run
+
+from bootstrap.verbs import VERBS
+
+# two of them compile the loop of a study, when nobody has before
+pytestmark = pytest.mark.timeout(900)
+
+ANALYSIS = {name: verb for name, verb in VERBS.items() if verb.package and not verb.ros}
+SAMPLES = ROOT / "docs" / "samples"
+REFERENCE = ROOT / "bags" / "reference"
+OF_THE_CLOCK = {"wall_s", "cpu_s", "cpu_ns_per_case_step", "estimates_per_cpu_s", "realtime_factor"}
+"""Keys of results that tell how long it took."""
+
+
+@pytest.fixture(scope="module")
+def without(tmp_path_factory):
+    """Packages laid out as where there is no ROS, and ROS out of reach."""
+    return packages_laid_out(tmp_path_factory.mktemp("without"))
+
+
+@pytest.fixture
+def both(without, tmp_path):
+    """Run a verb with ROS and without, each in a folder of its own; their outputs, with the folders as they are."""
+
+    def run_both(verb, *arguments):
+        outputs = []
+        for name, run_one in (
+            ("with", lambda *a, cwd: run(ROOT / "install", os.environ, *a, cwd=cwd)),
+            ("without", without.run),
+        ):
+            folder = tmp_path / name
+            folder.mkdir(exist_ok=True)
+            done = run_one(verb, *arguments, cwd=folder)
+            assert done.returncode == 0, done.stderr
+            outputs.append(done.stdout.replace(str(folder), ""))
+        return outputs
+
+    return run_both
+
+
+def files(folder: Path) -> dict[str, bytes]:
+    """Contents of all files below a folder by their paths in it."""
+    return {str(file.relative_to(folder)): file.read_bytes() for file in sorted(folder.rglob("*")) if file.is_file()}
+
+
+def assert_same_files(tmp_path, *expected):
+    left, here = files(tmp_path / "with"), files(tmp_path / "without")
+    assert here.keys() == left.keys()
+    assert [name for name in left if left[name] != here[name]] == []
+    assert {name for name in expected if name not in here} == set()
+
+
+def result(output: str):
+    """The JSON object on the last line of an output, without times."""
+    return without_times(json.loads(output.splitlines()[-1]))
+
+
+def without_times(value):
+    if isinstance(value, dict):
+        return {key: without_times(inner) for key, inner in value.items() if key not in OF_THE_CLOCK}
+    return [without_times(inner) for inner in value] if isinstance(value, list) else value
+
+
+def test_ros_is_out_of_reach(without):
+    code = (
+        "import sys; from css_msgs.msg import SunEstimate as S; print(S.__base__.__name__, S.RATE_GYRO); import rclpy"
+    )
+    done = subprocess.run(
+        [without.project.python, "-c", code], env=without.env, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "MessageClass 1\n"
+    assert "there is no ROS here" in done.stderr
+
+
+def test_verbs_load_without_ros_or_say_that_they_need_it(without):
+    """One that does not has to be declared in `bootstrap.verbs` (`ros=True`)."""
+    modules = [
+        f"{verb.package}.{room}.{verb.executable}" for verb in ANALYSIS.values() for room in ("commands", "verbs")
+    ]
+    assert len(modules) >= 14
+    done = subprocess.run(
+        [without.project.python, "-c", f"import {', '.join(modules)}"],
+        env=without.env, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+
+
+def test_imported_and_replayed_recordings(both, tmp_path):
+    both("import-csv", SAMPLES / "my_cells.csv", SAMPLES / "my_layout.yaml", "-o", "mine")
+    outputs = both("replay", "mine", "--estimators", "wavg", "--out", "replayed", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path, "mine/mine_0.mcap", "replayed/replayed_0.mcap")
+
+
+def test_a_flight_with_every_kind_of_message_is_mended_and_replayed(both, tmp_path):
+    both("recover", REFERENCE, "--output", "mended")
+    outputs = both("replay", "mended", "--estimators", "ekf", "--out", "replayed", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path, "mended/mended_0.mcap", "replayed/replayed_0.mcap")
+
+
+def test_studies(both, tmp_path):
+    study = ("--cases", "2", "--duration", "20", "--estimators", "ekf")
+    outputs = both("monte-carlo", "okeefe_2013", *study, "--out", "study", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path, "study/cases.parquet", "study/percentiles.parquet")
+
+
+@pytest.mark.parametrize(
+    ("verb", "arguments"),
+    [("coverage", ["okeefe_2013"]), ("slit-analyse", [SAMPLES / "my_pulses.csv", "--inclination-deg", "30"])],
+)
+def test_tables(both, verb, arguments):
+    outputs = both(verb, *arguments, "--json")
+    assert result(outputs[0]) == result(outputs[1])
