@@ -228,7 +228,7 @@ def test_the_c_library_of_this_machine_is_like_itself(tmp_path):
 @with_compiler
 def test_another_mathematics_is_named(tmp_path, monkeypatch):
     """A C library whose sine ends in another bit for one argument in four."""
-    runs = []
+    runs: list[Any] = []
 
     def run(target, program, stream):
         values = np.frombuffer(run_program(target, program, stream), np.uint64).copy()
