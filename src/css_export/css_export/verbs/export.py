@@ -157,8 +157,7 @@ def _shortcomings(library: Library, calls: Calls, options: argparse.Namespace) -
 
 
 def _tell(text: str) -> None:
-    if sys.stderr.isatty():
-        print(f"export: {text} ...", file=sys.stderr, flush=True)
+    print(f"export: {text} ...", file=sys.stderr, flush=True)
 
 
 def _print(rows: list[Row], verified: bool, folder: Path, lines: list[str], missing: list[str]) -> None:
