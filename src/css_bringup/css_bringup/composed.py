@@ -3,6 +3,7 @@
 
 import gc
 import time
+from collections.abc import Mapping
 from pathlib import Path
 
 from rclpy.context import Context
@@ -10,6 +11,7 @@ from rclpy.executors import ExternalShutdownException
 
 from css_bringup.flight_result import FlightResult, Progress, Stopped, as_flown
 from css_bringup.incidents import node_incidents
+from css_common.component import Component
 from css_common.executor import create_executor, retire, spin_about_until, spin_until
 from css_common.host import ComponentNode
 from css_common.link_kinds import PROCESSES_FAIL
@@ -29,7 +31,13 @@ class ComposedFlight:
     """
 
     def __init__(
-        self, mission: Mission, bag: Path | None = None, executor: str | None = None, *, overwrite: bool = False
+        self,
+        mission: Mission,
+        bag: Path | None = None,
+        executor: str | None = None,
+        *,
+        overwrite: bool = False,
+        stand_ins: Mapping[str, type[Component]] | None = None,
     ) -> None:
         """Prepares a flight.
 
@@ -38,6 +46,7 @@ class ComposedFlight:
             bag: where to record; None records nothing.
             executor: kind of executor, see `create_executor`.
             overwrite: replace a recording that is there.
+            stand_ins: components in the place of those of some nodes, by name.
 
         Raises:
             MissionError: no node of the mission owns simulated time, or it has faults of processes.
@@ -53,6 +62,7 @@ class ComposedFlight:
         self.recorder: RecorderNode | None = None
         self._executor_kind = executor
         self._overwrite = overwrite
+        self._stand_ins = stand_ins or {}
 
     def __enter__(self) -> "ComposedFlight":
         self.context.init()
@@ -69,8 +79,9 @@ class ComposedFlight:
             )
             self.executor.add_node(self.recorder)
         for node in mission.nodes:
+            component = self._stand_ins.get(node.name, node.component)
             self.nodes[node.name] = create_node(
-                node.component, node.name, mission, context=self.context, use_global_arguments=False
+                component, node.name, mission, context=self.context, use_global_arguments=False
             )
             self.executor.add_node(self.nodes[node.name])
         return self

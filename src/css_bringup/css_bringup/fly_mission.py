@@ -3,7 +3,7 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,6 +15,7 @@ from css_bringup.composed import ComposedFlight
 from css_bringup.flight_result import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
 from css_common import domains, network, places, security
+from css_common.component import Component
 from css_common.mission import Mission
 from css_common.preflight import preflight, report
 from css_common.progress_lines import ProgressLines, still_working
@@ -65,6 +66,7 @@ def fly(
     console: Console,
     overwrite: bool = False,
     ends: Ends = _goes_on,
+    stand_ins: Mapping[str, type[Component]] | None = None,
 ) -> FlightResult:
     """Flies a mission to its end, or until Ctrl-C or SIGTERM, after which the recording is complete up to there.
 
@@ -75,6 +77,7 @@ def fly(
         console: where progress is shown, when it is a terminal.
         overwrite: replace a recording that is there.
         ends: why it ends early, in one process.
+        stand_ins: components in the place of those of some nodes, by name; of a flight in one process.
 
     Raises:
         MissionError: a check before the flight refuses the mission; warnings go to standard error and the result.
@@ -86,7 +89,7 @@ def fly(
         if processes:
             result = _fly_processes(mission, bag, console, stop, overwrite)
         else:
-            result = _fly_composed(mission, bag, console, stop, overwrite, ends)
+            result = _fly_composed(mission, bag, console, stop, overwrite, ends, stand_ins or {})
     result.warnings = warnings
     return result
 
@@ -111,9 +114,15 @@ def _fly_processes(
 
 
 def _fly_composed(
-    mission: Mission, bag: Path | None, console: Console, stop: StopSignal, overwrite: bool, ends: Ends
+    mission: Mission,
+    bag: Path | None,
+    console: Console,
+    stop: StopSignal,
+    overwrite: bool,
+    ends: Ends,
+    stand_ins: Mapping[str, type[Component]],
 ) -> FlightResult:
-    with ComposedFlight(mission, bag, overwrite=overwrite) as flight:
+    with ComposedFlight(mission, bag, overwrite=overwrite, stand_ins=stand_ins) as flight:
         reason = ""
 
         def over() -> bool:

@@ -5,7 +5,7 @@ Standard library and setuptools only: `setup.py` runs it before anything is inst
 """
 
 import xml.etree.ElementTree as ET
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from setuptools import find_packages, setup
@@ -13,13 +13,20 @@ from setuptools import find_packages, setup
 from css_common.places import SECTIONS_INDEX
 
 
-def ros_package(setup_file: str, data_files: Sequence[tuple[str, list[str]]] = (), *, sections: bool = False) -> None:
+def ros_package(
+    setup_file: str,
+    data_files: Sequence[tuple[str, list[str]]] = (),
+    *,
+    sections: bool = False,
+    plugins: Mapping[str, list[str]] | None = None,
+) -> None:
     """Declares the package of a `setup.py`: every file in `nodes/` and `commands/` is an executable of its name.
 
     Args:
         setup_file: `__file__` of the `setup.py`, beside which package.xml lies.
         data_files: further files, as setuptools takes them; `{share}` is the package's folder of data.
         sections: the package brings mission sections (`SECTIONS` in its module `sections`).
+        plugins: what it offers to packages that do not import it, entry points by their group.
     """
     folder = Path(setup_file).parent
     manifest = ET.parse(folder / "package.xml").getroot()
@@ -39,7 +46,7 @@ def ros_package(setup_file: str, data_files: Sequence[tuple[str, list[str]]] = (
             *([(SECTIONS_INDEX, [f"resource/{package}"])] if sections else []),
             *((place.format(share=share), files) for place, files in data_files),
         ],
-        entry_points={"console_scripts": _executables(folder / package)},
+        entry_points={"console_scripts": _executables(folder / package), **(plugins or {})},
         zip_safe=False,
     )
 

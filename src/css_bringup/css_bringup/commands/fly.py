@@ -5,6 +5,7 @@ import sys
 
 from css_bringup.options import add_domain_option, add_mission_options, add_output_options, add_security_option, guarded
 from css_common.command import CommandParser, command_parser, implementation
+from css_report.after_run import add_page_option
 
 _EXAMPLES = (
     "okeefe_2013",
@@ -23,10 +24,16 @@ def _parser() -> CommandParser:
         "--realtime", type=float, nargs="?", const=1.0, metavar="FACTOR",
         help="pace against the wall clock (default factor 1.0)",
     )  # fmt: skip
+    parser.add_argument(
+        "--component", action="append", default=[], metavar="NODE=FILE", dest="components",
+        help="fly a library of `export`, or a program that speaks as it does, in the place of a node's compiled "
+        "function; may be repeated",
+    )  # fmt: skip
     parser.add_argument("--no-record", action="store_true", help="fly without a recording and figures of merit")
     add_domain_option(parser)
     add_security_option(parser)
     add_output_options(parser)
+    add_page_option(parser)
     return parser
 
 
@@ -34,6 +41,8 @@ def main(args: list[str] | None = None) -> int:
     """Entry point; 0: flown and all pass criteria of the mission met."""
     parser = _parser()
     arguments = parser.parse_args(args)
+    if arguments.components and arguments.processes:
+        parser.error("--component: libraries fly in one process; expected no --processes")
     run = implementation("css_bringup.verbs.fly")
     return guarded(parser.prog, lambda: run(arguments))
 

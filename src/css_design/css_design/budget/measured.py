@@ -6,7 +6,6 @@ all sunlit steps after its acquisition; a source alone is the mean square with i
 left out the mean square with all less that without it. Intervals are of a bootstrap over the cases (Efron 1979).
 """
 
-import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
@@ -14,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.mission import Mission, MissionError
+from css_common.processors import usable_processors
 from css_design.budget.sources import FILTER, LAYOUT, Source, heard_sources, is_active, seeing_everywhere, without
 from css_monte_carlo.case_tallies import SAMPLED, SUNLIT
 from css_monte_carlo.chunk import fly_cases
@@ -78,7 +78,7 @@ def fly(missions: dict[str, Mission], cases: int, tell: Tell) -> dict[str, Error
     # compiled, or loaded, before threads ask for it all at once
     done, total = 0, cases * len(flights)
     results: dict[str, list[Errors]] = {name: [] for name in flights}
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(usable_processors()) as pool:
         futures = [
             (name, len(part), pool.submit(_fly, flight, part)) for name, flight in flights.items() for part in numbers
         ]

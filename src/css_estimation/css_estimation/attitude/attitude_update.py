@@ -235,7 +235,7 @@ def _take_direction(
     if m.dof == 0:
         return state, tally
     nis = normalised_innovation(memory.covariance, m)
-    taken = nis <= _GATES[m.dof - 1] or (nis < math.inf and not _is_converged(p, memory))
+    taken = nis <= _GATES[min(max(m.dof, 1), 3) - 1] or (nis < math.inf and not _is_converged(p, memory))
     if not taken:
         return state, Tally(tally.nis, tally.taken, True, tally.lit_mask, tally.used)
     calibrates = p.cells.calibration.estimated

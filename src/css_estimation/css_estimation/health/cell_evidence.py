@@ -176,7 +176,8 @@ def _judge_on(
         cell.good = 0.0
     elif e.sight == SEEN and max(output, e.high) > SHOWS:
         cell.good += window
-    if cell.good >= p.return_time * 2.0 ** (cell.times - 1):
+    # a real exponent: numba raises a number to a whole one by a loop that can raise an exception
+    if cell.good >= p.return_time * 2.0 ** float(cell.times - 1):
         trust_again(memory, i)
 
 

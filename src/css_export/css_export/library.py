@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One kernel as a C library: its interface, its sources, its objects."""
+
+import hashlib
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+
+from css_common.mission import Mission
+from css_export.archive import archive
+from css_export.c_main import main_text
+from css_export.data_text import constant_text, init_text, limits_text, step_text, version_text
+from css_export.elf import Contents, contents
+from css_export.entry import Compiled, Interface, compile_function
+from css_export.flown import MEMORY, PARAMETERS, STATE, Function
+from css_export.header import header_text
+from css_export.layout import pack
+from css_export.limits import Limit, limits_of
+from css_export.machine_code import built
+from css_export.names import prefix_of
+from css_export.targets import Target
+
+_RELEASED = "css_estimation"  # whose version is that of Sunpoint
+
+
+@dataclass(frozen=True)
+class MachineCode:
+    """A library for a target.
+
+    Attributes:
+        stack: [bytes] of the step, without that of the functions that are linked.
+    """
+
+    target: Target
+    object: bytes
+    archive: bytes
+    contents: Contents
+    stack: int
+
+
+@dataclass(frozen=True)
+class Library:
+    """A kernel behind a C interface.
+
+    Attributes:
+        prefix: of all its symbols.
+        version: of Sunpoint, of the compilers, and the hash of the mission.
+        limits: of its parameters.
+        texts: its modules of intermediate code.
+    """
+
+    function: Function
+    prefix: str
+    version: str
+    interface: Interface
+    limits: list[Limit]
+    texts: tuple[str, ...]
+
+    @property
+    def exported(self) -> tuple[str, ...]:
+        """Symbols that others may link."""
+        names = ("step", "init", "check", "mission", "limits", "version")
+        return tuple(f"{self.prefix}_{name}" for name in names)
+
+    def for_target(self, target: Target) -> MachineCode:
+        """Its machine code.
+
+        Raises:
+            ExportError: something in it must not fly, or there is no code for such a target.
+        """
+        made = built(self.function.name, self.texts, self.exported, target)
+        stack = made.stacks[f"{self.prefix}_step"]
+        packed = archive({"step.o": made.object})
+        return MachineCode(target, made.object, packed, contents(made.object), stack)
+
+    def header(self) -> str:
+        """`sunpoint_NAME.h`."""
+        return header_text(self.function, self.interface, self.prefix, self.version, len(self.limits))
+
+    def main(self) -> str:
+        """`sunpoint_NAME_main.c`."""
+        return main_text(self.prefix)
+
+
+def state_values(function: Function, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
+    """What of a kernel's arguments is carried on, in the order of the struct of the state."""
+    return tuple(value for value, role in zip(arguments, function.roles, strict=True) if role in (STATE, MEMORY))
+
+
+def made_library(mission: Mission, function: Function) -> Library:
+    """Compiles a kernel of a mission.
+
+    Raises:
+        ExportError: it cannot be exported.
+    """
+    compiled: Compiled = compile_function(function)
+    interface, prefix = compiled.interface, prefix_of(function.name)
+    version = version_of(mission, function)
+    structs = interface.structs
+    p = function.sample[function.places(PARAMETERS)[0]]
+    limits = limits_of(structs[PARAMETERS], p)
+    texts = (
+        compiled.text,
+        step_text(prefix, compiled.symbol),
+        init_text(prefix, structs[STATE], state_values(function, function.sample)),
+        constant_text(f"{prefix}_mission", structs[PARAMETERS], pack(structs[PARAMETERS], p)),
+        limits_text(prefix, limits),
+        version_text(prefix, version),
+    )
+    return Library(function, prefix, version, interface, limits, texts)
+
+
+def version_of(mission: Mission, function: Function) -> str:
+    """What a library says of itself: what it was made of and by."""
+    digest = hashlib.sha256(mission.text().encode()).hexdigest()
+    return (
+        f"Sunpoint {_release()}, {function.component} of mission {mission.name}, sha256 of the mission {digest}, "
+        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}"
+    )
+
+
+def _release() -> str:
+    try:
+        return metadata.version(_RELEASED)
+    except metadata.PackageNotFoundError:
+        return "(not installed)"
+
+
+def write_library(library: Library, codes: list[MachineCode], folder: Path) -> list[Path]:
+    """Writes sources and objects of a library into a folder; which files.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    files = {
+        folder / f"{library.prefix}.h": library.header().encode(),
+        folder / f"{library.prefix}_main.c": library.main().encode(),
+    }
+    for code in codes:
+        place = folder / code.target.name
+        place.mkdir(exist_ok=True)
+        files[place / f"{library.prefix}.o"] = code.object
+        files[place / f"lib{library.prefix}.a"] = code.archive
+    for file, data in files.items():
+        file.write_bytes(data)
+    return list(files)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Within what each number of a struct of parameters must lie, from the tables that nodes declare.
+
+A field that is one parameter, as it stands or converted, has the limits of that parameter, converted likewise. Other
+fields hang on several parameters or on sections of the mission: of these it is asked that they are numbers, finite
+where the mission's is.
+"""
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+from css_common.schema import Parameter, Table
+from css_export.layout import Layout, Scalar, Struct, leaves
+from css_export.sole_parameter import Only, as_it_stands
+
+REAL, FLAG, WHOLE, SINGLE = 0, 1, 2, 3
+_LARGEST = math.nextafter(math.inf, 0.0)
+_SAMPLES = 33
+
+
+class Limit(NamedTuple):
+    """Of some numbers of one kind that follow one another."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    offset: int
+    kind: int
+    count: int  # type: ignore[assignment]
+    declared: bool  # by a parameter's own limits
+
+
+def limits_of(layout: Struct, p: Any) -> list[Limit]:
+    """The limits of a struct of parameters, in the order of its fields.
+
+    Args:
+        layout: of the struct.
+        p: the parameters of the mission.
+    """
+    return _joined(list(_limits(layout, p, "", 0)))
+
+
+def _limits(layout: Layout, value: Any, name: str, at: int) -> Iterator[Limit]:
+    if isinstance(layout, Struct) and hasattr(value, "_fields"):
+        sources = getattr(type(value), "_field_defaults", {})
+        for field, part in zip(layout.fields, value, strict=True):
+            told = f"{name}.{field.name}" if name else field.name
+            bounds = _declared(sources.get(field.name), part)
+            if bounds is not None and isinstance(field.layout, Scalar):
+                unit, low, high = bounds
+                yield Limit(told, unit, low, high, at + field.offset, _kind(field.layout), 1, True)
+            else:
+                yield from _limits(field.layout, part, told, at + field.offset)
+        return
+    for told, scalar, offset in leaves(layout, name, at):
+        yield Limit(told, "", *_any(scalar, value), offset, _kind(scalar), 1, False)
+
+
+def _any(scalar: Scalar, value: Any) -> tuple[float, float]:
+    if scalar.code == "?":
+        return 0.0, 1.0
+    infinite = isinstance(value, float) and math.isinf(value)
+    bound = math.inf if infinite else _LARGEST
+    return -bound, bound
+
+
+def _kind(scalar: Scalar) -> int:
+    return {"d": REAL, "f": SINGLE, "?": FLAG, "q": WHOLE}[scalar.code]
+
+
+def _joined(limits: list[Limit]) -> list[Limit]:
+    """Numbers of an array, of which nothing differs but the place, as one entry."""
+    sizes = {REAL: 8, FLAG: 1, WHOLE: 8, SINGLE: 4}
+    joined: list[Limit] = []
+    for limit in limits:
+        last = joined[-1] if joined else None
+        follows = (
+            last is not None
+            and limit.name.endswith("]")
+            and last.name.partition("[")[0] == limit.name.partition("[")[0]
+            and last.name.endswith("]")
+            and (last.low, last.high, last.kind) == (limit.low, limit.high, limit.kind)
+            and last.offset + last.count * sizes[last.kind] == limit.offset
+        )
+        if follows and last is not None:
+            joined[-1] = last._replace(count=last.count + 1)
+        else:
+            joined.append(limit)
+    return joined
+
+
+def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
+    """Unit, least and largest value of a field that hangs on one parameter; None where that says nothing."""
+    table: Table = getattr(source, "table", ())
+    if len(table) != 1 or not isinstance(value, (bool, int, float)):
+        return None
+    (parameter,) = table
+
+    def made(given: Any) -> float:
+        return float(source.build(Only(parameter, given)))
+
+    try:
+        bounds = _bounds(parameter, made)
+    except (LookupError, AttributeError, TypeError, ValueError, ArithmeticError):
+        return None  # it hangs on more than this parameter
+    if bounds is None:
+        return None
+    unit = parameter.unit if as_it_stands(source) else f"from {parameter.name} [{parameter.unit}]"
+    return unit, *bounds
+
+
+def _bounds(parameter: Parameter[Any], made: Callable[[Any], float]) -> tuple[float, float] | None:
+    if parameter.kind == "choice":
+        values = sorted(made(choice) for choice in parameter.choices)
+        return values[0], values[-1]
+    if parameter.kind == "flag":
+        values = sorted((made(False), made(True)))
+        return values[0], values[-1]
+    if parameter.kind not in ("real", "integer") or parameter.low is None or parameter.high is None:
+        return None
+    low, high = parameter.low, parameter.high
+    if parameter.open_low:
+        low = math.nextafter(low, math.inf)
+    points = [low + (high - low) * i / (_SAMPLES - 1) for i in range(_SAMPLES - 1)] + [high]
+    if parameter.kind == "integer":
+        points = [round(point) for point in points]
+    values = [made(point) for point in points]
+    if values != sorted(values) and values != sorted(values, reverse=True):
+        return None
+    return min(values), max(values)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: Apache-2.0
+"""An exported library beside the kernel that flew: every output and every state, bit by bit."""
+
+import math
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from css_export.flown import OUTPUT
+from css_export.layout import Struct, leaves
+from css_export.library import Library
+from css_export.programs import compiled_program, run_program
+from css_export.recorded_calls import Calls
+from css_export.targets import Target
+
+
+@dataclass
+class Verdict:
+    """How a library did.
+
+    Attributes:
+        steps: that it made.
+        equal: of them, those after which outputs and state were the same bits.
+        equal_outputs: those after which the outputs were.
+        largest: relative difference of an output, by its name in C; those that differ alone.
+    """
+
+    steps: int
+    equal: int
+    equal_outputs: int
+    largest: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def largest_relative_difference(self) -> float:
+        """Over all outputs; infinite where one is a number and the other is none."""
+        return max(self.largest.values(), default=0.0)
+
+
+def run_library(library: Library, target: Target, folder: Path, calls: Calls) -> bytes:
+    """What the program of a library writes for the calls of a flight.
+
+    Raises:
+        ToolError: it cannot be compiled or run here.
+    """
+    place = folder / target.name
+    program = place / f"{library.prefix}_main"
+    source, packed = folder / f"{library.prefix}_main.c", place / f"lib{library.prefix}.a"
+    compiled_program(target, [source], [packed], program)
+    return run_program(target, program, bytes(calls.stream))
+
+
+def judged(library: Library, calls: Calls, written: bytes) -> Verdict:
+    """What was written, held against what the kernel gave."""
+    size = library.interface.structs[OUTPUT].size
+    record = size + 8
+    steps = min(len(written) // record, calls.steps)
+    verdict = Verdict(steps, 0, 0)
+    for k in range(steps):
+        output = written[k * record : k * record + size]
+        (state,) = struct.unpack_from("<Q", written, k * record + size)
+        if output == calls.outputs[k]:
+            verdict.equal_outputs += 1
+            verdict.equal += state == calls.hashes[k]
+        else:
+            _note(verdict.largest, library.interface.structs[OUTPUT], calls.outputs[k], output)
+    return verdict
+
+
+def _note(largest: dict[str, float], layout: Struct, expected: bytes, given: bytes) -> None:
+    for name, scalar, at in leaves(layout):
+        if expected[at : at + scalar.size] == given[at : at + scalar.size]:
+            continue
+        (a,), (b,) = (struct.unpack_from("<" + scalar.code, data, at) for data in (expected, given))
+        largest[name] = max(largest.get(name, 0.0), relative_difference(a, b))
+
+
+def relative_difference(a: float, b: float) -> float:
+    """|a - b| over the larger of both; infinite where only one is a number."""
+    if a == b or (a != a and b != b):
+        return 0.0
+    scale = max(abs(a), abs(b))
+    return abs(a - b) / scale if math.isfinite(scale) and a == a and b == b else math.inf
