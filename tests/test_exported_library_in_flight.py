@@ -37,8 +37,8 @@ def files(mission, tmp_path_factory):
     own = folder / "own.c"
     own.write_text(
         '#include "sunpoint_ekf.h"\n'
-        "void sunpoint_ekf_step(const sunpoint_ekf_params *params, sunpoint_ekf_state *state, const sunpoint_ekf_in *in,"
-        " sunpoint_ekf_out *out)\n{\n    (void)params;\n    (void)state;\n    (void)in;\n"
+        "void sunpoint_ekf_step(const sunpoint_ekf_params *params, sunpoint_ekf_state *state,\n"
+        "    const sunpoint_ekf_in *in, sunpoint_ekf_out *out)\n{\n    (void)params;\n    (void)state;\n    (void)in;\n"
         "    out->sun_b[2] = 1.0;\n    out->covariance[0] = -1.0;\n    out->validity = 2;\n}\n"
     )
     return {

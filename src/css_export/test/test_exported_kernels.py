@@ -4,24 +4,26 @@
 import shutil
 import struct
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import pytest
 
 from css_common.kernel import kernel
 from css_common.mission import load_mission, mission_from_text
+from css_export import mathematics
 from css_export.c_main import STEP, word
-from css_export.elf import contents
+from css_export.elf import Contents, contents
 from css_export.errors import ExportError
 from css_export.flown import INPUT, PARAMETERS, STATE, Function, flying_functions
 from css_export.layout import pack
-from css_export.library import made_library, write_library
+from css_export.library import MachineCode, made_library, write_library
 from css_export.machine_code import built
 from css_export.programs import compiled_object, compiled_program, run_program, why_not
 from css_export.recorded_calls import listen
 from css_export.targets import TARGETS
-from css_export.verification import judged, relative_difference, run_library
+from css_export.verbs.export import Row
+from css_export.verification import Verdict, judged, relative_difference, run_library
 from css_recording.bag_reader import BagReader
 
 REFERENCE = Path(__file__).parents[3] / "bags" / "reference"
@@ -216,3 +218,39 @@ def test_a_missing_value_stays_missing(exported):
     packed = pack(library.interface.structs[INPUT], tuple(sample[3:]))
     (first,) = struct.unpack_from("<d", packed, 8)
     assert first != first
+
+
+@with_compiler
+def test_the_c_library_of_this_machine_is_like_itself(tmp_path):
+    assert mathematics.differing_functions(["sincos", "atan2", "expm1", "memset"], HOST, tmp_path) == {}
+
+
+@with_compiler
+def test_another_mathematics_is_named(tmp_path, monkeypatch):
+    """A C library whose sine ends in another bit for one argument in four."""
+    runs: list[Any] = []
+
+    def run(target, program, stream):
+        values = np.frombuffer(run_program(target, program, stream), np.uint64).copy()
+        if runs:
+            values[mathematics.ARGUMENTS :: 4] ^= 1
+        runs.append(target)
+        return values.tobytes()
+
+    monkeypatch.setattr(mathematics, "run_program", run)
+    assert mathematics.differing_functions(["sin", "cos"], HOST, tmp_path) == {"sin": 0.25}
+
+
+@pytest.mark.parametrize(
+    ("equal", "largest", "differing", "right"),
+    [
+        (10, {}, None, True),
+        (9, {"sun_b[0]": 1e-15}, {"sin": 0.1}, True),
+        (9, {"sun_b[0]": 1e-15}, {}, False),
+        (9, {"sun_b[0]": 1e-9}, {"sin": 0.1}, False),
+    ],
+)
+def test_a_difference_has_to_be_small_and_of_a_named_function(equal, largest, differing, right):
+    code = MachineCode(HOST, b"", b"", Contents(0, 0, 0, ()), 0)
+    row = Row(cast(Any, None), code, Verdict(10, equal, equal, largest), None, differing)
+    assert row.is_right is right

@@ -11,18 +11,10 @@ from rosbags.typesys.store import Typestore
 PARAMETER_EVENTS = "/parameter_events"
 """Topic on which nodes tell of their parameters."""
 
-# fields of rcl_interfaces/msg/ParameterValue in the order of its types, which begin with 1
-_VALUES = (
-    "bool",
-    "integer",
-    "double",
-    "string",
-    "byte_array",
-    "bool_array",
-    "integer_array",
-    "double_array",
-    "string_array",
-)
+_EVENT = "rcl_interfaces/msg/ParameterEvent"
+_ARRAYS = ("byte_array", "bool_array", "integer_array", "double_array", "string_array")
+_VALUES = ("bool", "integer", "double", "string", *_ARRAYS)
+"""Fields of rcl_interfaces/msg/ParameterValue in the order of its types, which begin with 1."""
 
 
 class RecordedSetting(NamedTuple):
@@ -40,9 +32,17 @@ def read_setting(data: bytes, stamp_ns: int) -> RecordedSetting:
         data: the serialised message.
         stamp_ns: latest stamp of the flight when it was recorded.
     """
-    event: Any = _types().deserialize_cdr(data, "rcl_interfaces/msg/ParameterEvent")
+    event = _read(data)
     values = {parameter.name: _value(parameter.value) for parameter in event.changed_parameters}
     return RecordedSetting(stamp_ns, event.node.rsplit("/", 1)[-1], values)
+
+
+def _read(data: bytes) -> Any:
+    types = _types()
+    definition = types.get_msgdef(_EVENT)
+    # not by `deserialize_cdr`: it refuses more than three bytes behind the end, where rclpy leaves up to eight
+    event, _ = definition.deserialize_cdr_le(data[4:], 0, definition.cls, types)
+    return event
 
 
 @cache

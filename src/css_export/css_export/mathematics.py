@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Which functions of the C library give other bits on another processor than on this one.
+
+Where a step differs, the reason is one of the functions that the library links: each is asked for the same arguments
+on both, and the bits are compared.
+"""
+
+import struct
+from pathlib import Path
+
+from css_export.programs import compiled_program, run_program
+from css_export.targets import HOST, TARGETS, Target
+
+_OF_ONE = ("acos", "asin", "atan", "cos", "exp", "exp2", "expm1", "log", "log1p", "sin", "sinh", "sqrt", "tan", "tanh")
+_OF_TWO = ("atan2", "fmod", "hypot", "pow")
+ARGUMENTS = 20000
+
+
+def differing_functions(linked: list[str], target: Target, folder: Path) -> dict[str, float]:
+    """Share of arguments for which a linked function gives other bits than here, by its name; those that do alone.
+
+    Args:
+        linked: names that a library links.
+        target: the other processor.
+        folder: where the program goes.
+
+    Raises:
+        ToolError: it cannot be compiled or run.
+    """
+    names = {"sin", "cos"} if "sincos" in linked else set()
+    asked = sorted((names | set(linked)) & {*_OF_ONE, *_OF_TWO})
+    if not asked:
+        return {}
+    source = folder / "mathematics.c"
+    source.write_text(program_text(asked), encoding="utf-8")
+    given = []
+    for one in (TARGETS[HOST], target):
+        program = compiled_program(one, [source], [], folder / f"mathematics_{one.name}")
+        given.append(run_program(one, program, b""))
+    here, there = (struct.unpack(f"<{len(asked) * ARGUMENTS}Q", data) for data in given)
+    shares = {}
+    for k, name in enumerate(asked):
+        rows = slice(k * ARGUMENTS, (k + 1) * ARGUMENTS)
+        other = sum(a != b for a, b in zip(here[rows], there[rows], strict=True))
+        if other:
+            shares[name] = other / ARGUMENTS
+    return shares
+
+
+def program_text(names: list[str]) -> str:
+    """A program in C that writes what each function gives for arguments from -4 to 4, or for some from 0 to 1."""
+    calls = "".join(_call(name) for name in names)
+    return f"""/* SPDX-License-Identifier: Apache-2.0 */
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+
+static uint64_t drawn;
+
+/* from 0 to 1; a linear congruential generator (Knuth, MMIX) */
+static double draw(void)
+{{
+    drawn = drawn * 6364136223846793005u + 1442695040888963407u;
+    return (double)(drawn >> 11) / 9007199254740992.0;
+}}
+
+int main(void)
+{{
+    volatile double x, y, given;
+    int k;
+{calls}    return fflush(stdout) == 0 ? 0 : 1;
+}}
+"""
+
+
+def _call(name: str) -> str:
+    positive = name in ("log", "acos", "asin", "sqrt", "log1p", "pow")
+    arguments = "x, y" if name in _OF_TWO else "x"
+    return f"""    drawn = 1;
+    for (k = 0; k < {ARGUMENTS}; k++) {{
+        x = {"draw()" if positive else "8.0 * draw() - 4.0"};
+        y = 8.0 * draw() - 4.0;
+        given = {name}({arguments});
+        (void)y;
+        if (fwrite((const void *)&given, sizeof given, 1, stdout) != 1) {{
+            return 1;
+        }}
+    }}
+"""
