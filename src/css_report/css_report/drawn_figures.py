@@ -107,7 +107,7 @@ class _Axes:
         remark = axes.get_title("right")
         box = axes.get_legend()
         heading = box.get_title().get_text() if box is not None else ""
-        caption = ". ".join(text.replace("\n", "; ") for text in (heading, remark, *self.notes) if text)
+        caption = ". ".join(text.replace("\n", "; ").rstrip(".") for text in (heading, remark, *self.notes) if text)
         return Plot(
             key,
             ", ".join(filter(None, (title, *self.inside))) or "Figure",

@@ -83,22 +83,35 @@ def heatmap(image: AxesImage, axes: Axes) -> tuple[dict[str, Any], str]:
     factor = int(np.ceil(np.sqrt(rows * columns / _MOST_FIELDS))) if rows * columns > _MOST_FIELDS else 1
     counts = isinstance(image.norm, BoundaryNorm)
     coarse = _pooled(array, factor, smallest=counts) if factor > 1 else array
-    low, high = image.get_clim()
-    shades = [to_hex(image.cmap(k / (_SHADES - 1))) for k in range(_SHADES)]
+    low, high, colours = _scale(image, coarse)
     trace = {
         "type": "heatmap",
         "x": _middles(left, right, coarse.shape[1]),
-        "y": _middles(min(bottom, top), max(bottom, top), coarse.shape[0]) if image.origin == "lower"
-        else _middles(bottom, top, coarse.shape[0]),
+        "y": _middles(bottom, top, coarse.shape[0]),
         "z": np.asarray(coarse, np.float32),
-        "zmin": float(np.nanmin(coarse)) if low is None or counts else float(low),
-        "zmax": float(np.nanmax(coarse)) if high is None or counts else float(high),
-        "colorscale": [[k / (_SHADES - 1), shade] for k, shade in enumerate(shades)],
+        "zmin": low,
+        "zmax": high,
+        "colorscale": colours,
         "colorbar": {"thickness": 12, "outlinewidth": 0},
-    }  # fmt: skip
+    }
     what = "smallest" if counts else "largest"
     note = f"Each field of the map is the {what} of {factor} by {factor}." if factor > 1 else ""
     return trace, note
+
+
+def _scale(image: AxesImage, values: np.ndarray) -> tuple[float, float, list[list[Any]]]:
+    """Ends of the scale of a map and its colours; of classes each has its own, as in the figure."""
+    if isinstance(image.norm, BoundaryNorm):
+        edges, count = image.norm.boundaries, len(image.norm.boundaries) - 1
+        low, high = float(edges[0]), float(edges[-1])
+        steps = [(float(edge) - low) / (high - low) for edge in edges]
+        own = [to_hex(image.cmap(int(image.norm(0.5 * (edges[k] + edges[k + 1]))))) for k in range(count)]
+        return low, high, [[at, own[k]] for k in range(count) for at in (steps[k], steps[k + 1])]
+    low_given, high_given = image.get_clim()
+    low = float(np.nanmin(values)) if low_given is None else float(low_given)
+    high = float(np.nanmax(values)) if high_given is None else float(high_given)
+    shades = [to_hex(image.cmap(k / (_SHADES - 1))) for k in range(_SHADES)]
+    return low, high, [[k / (_SHADES - 1), shade] for k, shade in enumerate(shades)]
 
 
 def _middles(low: float, high: float, count: int) -> np.ndarray:

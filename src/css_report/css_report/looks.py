@@ -18,8 +18,9 @@ class Look(NamedTuple):
     marker: str = ""  # empty: none
 
     def beside(self) -> "Look":
-        """The look of a second line of the same thing: dotted, with the same marker hollow."""
-        return Look(self.colour, "dot", f"{self.marker}-open" if self.marker else "")
+        """The look of a second line of the same thing: another dash, and the same marker hollow."""
+        dash = _DASHES[(_DASHES.index(self.dash) + 2) % len(_DASHES)]
+        return Look(self.colour, dash, f"{self.marker}-open" if self.marker else "")
 
     def dashed(self, dash: str) -> "Look":
         """The same colour, without markers and with another dash."""

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 from figure_checks import checked_figures
+from matplotlib.colors import BoundaryNorm, ListedColormap
 
 from css_analysis import figure_style
 from css_analysis.figure_style import BLUE, VERMILION, keep_figures, kept_figure, new_figure, save, style
@@ -97,6 +98,23 @@ def test_a_large_map_keeps_its_largest_value(tmp_path):
     assert trace["z"].max() == 5.0 and trace["z"].shape == (360, 720)
     assert abs(trace["x"][column] - (777.5 / 4.0)) < 0.5 and abs(trace["y"][row] - (333.5 / 4.0 - 90.0)) < 0.5
     assert "Shades: error [deg]" in plot.caption and "largest of 2 by 2" in plot.caption
+
+
+def test_classes_of_a_map_keep_their_colours(tmp_path):
+    with style():
+        drawn = new_figure(6.0, 4.0)
+        axes = drawn.subplots()
+        colours = ListedColormap(["#ff0000", "#00ff00", "#0000ff"])
+        axes.imshow(np.array([[1, 2], [2, 1]]), cmap=colours, norm=BoundaryNorm(np.arange(4) - 0.5, 3), aspect="auto")
+        axes.set_xlabel("x")
+        axes.set_ylabel("y")
+        save(drawn, tmp_path / "classes.png")
+    plots = plots_of(drawn, "classes")
+    assert plots is not None
+    (trace,) = plots[0].traces
+    assert (trace["zmin"], trace["zmax"]) == (-0.5, 2.5)  # none is 0, whose colour is not given to 1
+    assert [colour for _, colour in trace["colorscale"][::2]] == ["#ff0000", "#00ff00", "#0000ff"]
+    assert trace["colorscale"][2][0] == pytest.approx(1.0 / 3.0)
 
 
 def test_what_has_no_counterpart_leaves_the_picture(tmp_path):
