@@ -3,9 +3,9 @@
 
 How often the true values lie within the stated error, and how headings err before, after, and with cells that are known
 exactly. The scale error of a case is normal with 5, 10, 15 or 20 %, in turn. The first two thirds of a flight
-calibrate, headings are measured on the last third. The last line is a JSON object; the exit code is 1 when fewer than 99 % of the
-parameters lie within three of their standard deviations, or when the mean heading error of `ekf` after calibration is
-more than 10 % above that with known cells.
+calibrate, headings are measured on the last third. The last line is a JSON object; the exit code is 1 when fewer than
+99 % of the parameters lie within three of their standard deviations, or when the mean heading error of `ekf` after
+calibration is more than 10 % above that with known cells.
 
     python benchmarks/calibration_recovery.py --cases 200 --reference truth
 """
@@ -62,7 +62,7 @@ def ratios(flight: Flown, c: Calibration) -> tuple[np.ndarray, np.ndarray]:
     common = c.common()
     if common is not None:
         return of_cells, (common[0] - true) / common[1]
-    aids = [(b.x - t) / b.sigma for b, t in ((c.bias, true[:3]), (c.field, true[3:])) if b is not None]
+    aids = [(b.x - t) / b.sigma for b, t in ((c.bias, true[:3]), (c.of_field, true[3:])) if b is not None]
     return of_cells, np.concatenate(aids) if aids else np.zeros(0)
 
 

@@ -2,10 +2,10 @@
 """What `check` makes of recordings with one fault each: right verdicts, wrong ones, misses, and false ones.
 
 Each kind of fault of a cell is flown on several missions, from a third of the flight on, and once more without. A fault
-that changes fewer than ten outputs by more than 0.1 shows nothing and is counted apart. A verdict is right when its cell
-fails and its kind is the one that was flown, or one that reads the same (a frozen cell is stuck, one that reads nothing
-is dead, all light lost alike is a scale). False is every verdict on a cell without a fault. The last line is a JSON
-object; the exit code is 1 when one in ten verdicts is wrong, missing or false.
+that changes fewer than ten outputs by more than 0.1 shows nothing and is counted apart. A verdict is right when its
+cell fails and its kind is the one that was flown, or one that reads the same: a frozen cell is stuck, one that reads
+nothing is dead, all light lost alike is a scale. False is every verdict on a cell without a fault. The last line is a
+JSON object; the exit code is 1 when one in ten verdicts is wrong, missing or false.
 
     python benchmarks/check_verdicts.py --cases 2 --reference truth
 """

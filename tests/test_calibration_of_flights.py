@@ -72,7 +72,7 @@ def test_what_was_told_is_worth_it(flights, by_truth):
     nominal = c.data.normals_b
     true = true_parameters(flight.mission)
     found = measured(flight, c.parameters, normals_of(nominal, c.parameters))
-    runs = ([], found, measured(flight, true, normals_of(nominal, true)))
+    runs: tuple[list[str], ...] = ([], found, measured(flight, true, normals_of(nominal, true)))
     before, after, known = (heading_errors(flight, "ekf", overrides, 2000.0).mean() for overrides in runs)
     assert before > 2.0 * known
     assert after < 1.1 * known
@@ -80,11 +80,11 @@ def test_what_was_told_is_worth_it(flights, by_truth):
 
 def test_gyro_and_magnetometer_by_a_truth(flights, by_truth):
     for flight, c in zip(flights, by_truth, strict=True):
-        assert c.bias is not None and c.field is not None
+        assert c.bias is not None and c.of_field is not None
         true = true_common(flight.mission)
         assert np.abs((c.bias.x - true[:3]) / c.bias.sigma).max() < 4.0
-        assert np.abs((c.field.x - true[3:]) / c.field.sigma).max() < 4.0
-        assert np.linalg.norm(c.field.x[:3] - true[3:6]) < 0.1 * np.linalg.norm(true[3:6])
+        assert np.abs((c.of_field.x - true[3:]) / c.of_field.sigma).max() < 4.0
+        assert np.linalg.norm(c.of_field.x[:3] - true[3:6]) < 0.1 * np.linalg.norm(true[3:6])
 
 
 def test_rates_field_and_place_do_without_a_truth(flights, by_batch):
@@ -105,7 +105,7 @@ def test_rates_field_and_place_do_without_a_truth(flights, by_batch):
 
 def test_a_sun_alone_calibrates_and_says_what_it_does_not_know(flights):
     c = calibrate(thin(sun_alone(flights[0])), curve="okeefe", holdout=0.25)
-    assert c.reference == SUN and c.field is None
+    assert c.reference == SUN and c.of_field is None
     assert any("light of the Earth is not predicted" in note for note in c.notes)
     told = ratios(flights[0], c)
     assert len(told) > 20 and np.mean(np.abs(told) <= 3.0) > 0.9

@@ -5,11 +5,12 @@ import numpy as np
 import pytest
 from listing import MISSIONS, components, executable, mission_of
 
+from css_analysis.configured_mission import configured
 from css_common.codec import codec_of, type_name
 from css_common.component import INERTIAL
 from css_common.mission import load_mission
 from css_estimation.sun.sun_estimator import SunEstimator
-from css_monte_carlo.direct_flight import configured, fly_and_keep
+from css_monte_carlo.direct_flight import fly_and_keep
 
 CYCLES = 50
 STAND_INS = [executable(kind) for kind in components(base=SunEstimator) if mission_of(kind) is None]

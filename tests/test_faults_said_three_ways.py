@@ -10,9 +10,9 @@ from flights import fly_composed, messages_by_topic, samples
 from rclpy.node import Node
 from test_faults_in_flight import CASE, mission_with, trace_of
 
+from css_analysis.faults_flown import faults_flown
 from css_analysis.flight_log import read_flight
 from css_bringup.composed import ComposedFlight
-from css_bringup.faults_flown import faults_flown
 from css_common.executor import retire
 from css_common.fault_lines import parse_line
 from css_common.mission import Mission

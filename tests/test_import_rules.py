@@ -18,6 +18,7 @@ FLOORS = (
     {"css_environment", "css_recording", "css_sensors"},
     {"css_sim", "css_estimation", "sunpoint_control", "css_drivers", "css_telemetry"},
     {"css_analysis"},
+    {"css_report"},
     {"css_bringup", "css_calibration", "css_monte_carlo"},
     {"css_papers", "css_design", "css_export"},
 )

@@ -109,7 +109,7 @@ def test_what_the_import_says(report):
     assert report.states is not None and report.states.known == ("sun", "attitude", "position", "illumination")
     assert report.messages == {
         "/truth": LINES, "/css/voltages": LINES, "/gyro/imu": LINES, "/mag/field": LINES, "/wheels/state": LINES,
-        "/temperature/temp": LINES,
+        "/css/temperature": LINES,
     }  # fmt: skip
     _, r_n, sun_n, flux, field_n, attitude = motion()
     telemetry = report.telemetry
@@ -141,6 +141,7 @@ def replayed(bag: Path, capsys, *estimators: str) -> dict:
     return json.loads(capsys.readouterr().out.splitlines()[-1])
 
 
+@pytest.mark.timeout(1500)  # compiles seven estimators where none is in the cache
 def test_all_of_it_reaches_the_estimators(report, capsys):
     names = ["attitude_filter", "triad", "flat", "ekf", "wavg", "wls", "sun_filter"]
     result = replayed(report.recording, capsys, *names)

@@ -6,11 +6,11 @@ import pytest
 from flights import fly_composed
 from listing import MISSIONS, anywhere, controlled_by, estimators_by_mission
 
+from css_analysis.configured_mission import configured
 from css_analysis.flight_log import read_flight
 from css_common.mission import find_mission, load_mission, mission_from_text
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
-from css_monte_carlo.direct_flight import configured
 from css_monte_carlo.mission_flight import MissionFlight
 from css_msgs.msg import SunEstimate
 from sunpoint_control.nodes.magnetic_control import MagneticControl

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Analysis where there is no ROS: no verb of it asks for ROS, and each leaves the same bytes as with it."""
 
+import ast
 import json
 import os
 import subprocess
@@ -8,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from listing import ROOT
-from without_ros import packages_laid_out, run
+from without_ros import ROS, packages_laid_out, run
 
 from bootstrap.verbs import VERBS
 
@@ -32,7 +33,7 @@ def without(tmp_path_factory):
 def both(without, tmp_path):
     """Run a verb with ROS and without, each in a folder of its own; their outputs, with the folders as they are."""
 
-    def run_both(verb, *arguments):
+    def run_both(verb, *arguments, expected=(0,)):
         outputs = []
         for name, run_one in (
             ("with", lambda *a, cwd: run(ROOT / "install", os.environ, *a, cwd=cwd)),
@@ -41,7 +42,7 @@ def both(without, tmp_path):
             folder = tmp_path / name
             folder.mkdir(exist_ok=True)
             done = run_one(verb, *arguments, cwd=folder)
-            assert done.returncode == 0, done.stderr
+            assert done.returncode in expected, done.stderr
             outputs.append(done.stdout.replace(str(folder), ""))
         return outputs
 
@@ -82,17 +83,38 @@ def test_ros_is_out_of_reach(without):
     assert "there is no ROS here" in done.stderr
 
 
+def imported_packages(file: Path) -> set[str]:
+    """Packages that a module imports anywhere, in functions too; not what is for type checkers alone."""
+    found = set()
+    waiting: list[ast.AST] = [ast.parse(file.read_text(encoding="utf-8"))]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        if isinstance(node, ast.Import):
+            found |= {alias.name.partition(".")[0] for alias in node.names}
+        if isinstance(node, ast.ImportFrom) and node.module:
+            found.add(node.module.partition(".")[0])
+        waiting += ast.iter_child_nodes(node)
+    return found
+
+
 def test_verbs_load_without_ros_or_say_that_they_need_it(without):
     """One that does not has to be declared in `bootstrap.verbs` (`ros=True`)."""
     modules = [
         f"{verb.package}.{room}.{verb.executable}" for verb in ANALYSIS.values() for room in ("commands", "verbs")
     ]
     assert len(modules) >= 14
+    code = f"import sys, {', '.join(modules)}; print(*(getattr(m, '__file__', '') for m in sys.modules.values()))"
     done = subprocess.run(
-        [without.project.python, "-c", f"import {', '.join(modules)}"],
-        env=without.env, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        [without.project.python, "-c", code], env=without.env, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
+    ours = [Path(file) for file in done.stdout.split() if file.startswith(str(ROOT)) and "site-packages" not in file]
+    assert len(ours) > 200
+    there = {folder.name for folder in (ROOT / "src/css_msgs/common_interfaces").iterdir()} | {"css_msgs"}
+    late = [f"{file}: {name}" for file in ours for name in imported_packages(file) if ROS.fullmatch(name)]
+    assert [line for line in late if line.rpartition(" ")[2] not in there] == []
 
 
 def test_imported_and_replayed_recordings(both, tmp_path):
@@ -114,6 +136,18 @@ def test_studies(both, tmp_path):
     outputs = both("monte-carlo", "okeefe_2013", *study, "--out", "study", "--json")
     assert result(outputs[0]) == result(outputs[1])
     assert_same_files(tmp_path, "study/cases.parquet", "study/percentiles.parquet")
+
+
+def test_a_mission_of_ones_own(both, tmp_path):
+    outputs = both("new", "mysat", "--size", "0.1,0.1,0.2", "--mass", "2.6", "--yes", "--json", expected=(0, 1))
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path, "mysat.yaml")
+
+
+def test_verdicts_on_cells(both):
+    outputs = both("check", REFERENCE, "--json", expected=(0, 1))
+    assert result(outputs[0]) == result(outputs[1])
+    assert result(outputs[0])["cells"]
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 """The verbs as they start on a machine without ROS: packages laid out as there, and every part of ROS out of reach."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Mapping
@@ -20,12 +21,14 @@ from bootstrap.work import Work
 
 # What the wheels of ROS bring. `site-packages` of the tests holds them all, message packages too: those that are laid
 # out come first, and of the others nothing may be taken.
+ROS = re.compile("rcl.*|rosidl.*|ament.*|rpyutils|rmw.*|launch.*|ros2.*|osrf.*|.*_msgs|.*_interfaces")
+"""Names of packages of ROS."""
 HIDE = """
 import importlib.abc
 import re
 import sys
 
-ROS = re.compile("rcl.*|rosidl.*|ament.*|rpyutils|rmw.*|launch.*|ros2.*|osrf.*|.*_msgs|.*_interfaces")
+ROS = re.compile({ros!r})
 HERE = set({laid_out!r})
 
 
@@ -80,7 +83,7 @@ def _environment(work: Work) -> dict[str, str]:
     hidden = work.project.root / "hidden"
     hidden.mkdir()
     laid_out = sorted(entry.name for entry in python.iterdir() if (entry / "msg").is_dir())
-    (hidden / "sitecustomize.py").write_text(HIDE.format(laid_out=laid_out))
+    (hidden / "sitecustomize.py").write_text(HIDE.format(ros=ROS.pattern, laid_out=laid_out))
     for entry in python.iterdir():
         if entry.is_symlink():
             # taken from where the tests have them, so that what is compiled is compiled once

@@ -2,15 +2,16 @@
 """The verbs: help, unknown names, and that each names an executable of a package."""
 
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 from noting import noted
 
-from bootstrap import checks, cli
+from bootstrap import checks, cli, host
 from bootstrap.cli import main
-from bootstrap.project import Project
+from bootstrap.project import Project, Refusal
 from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
 from bootstrap.version import version_text
 
@@ -47,6 +48,27 @@ def test_a_verb_that_needs_ros_says_so_in_one_line_and_before_anything_is_set_up
     assert main([verb]) == 1
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"sunpoint: {verb} needs ROS 2 Jazzy") and "source /opt/ros/jazzy" in line
+
+
+def test_a_sourced_jazzy_is_used_on_any_machine(tmp_path, monkeypatch, capsys):
+    rclpy = tmp_path / "lib" / f"python3.{sys.version_info[1]}" / "site-packages" / "rclpy"
+    rclpy.mkdir(parents=True)
+    for name, value in (("MACHINE", "Linux aarch64"), ("HOME", "")):
+        monkeypatch.setenv(f"SUNPOINT_{name}", value)
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    asked = []
+
+    def prepare(_project, ros, base, _with_tests):
+        asked.append((ros, host.system_python(base)))
+        raise Refusal("far enough")
+
+    monkeypatch.setattr(cli, "_prepare", prepare)
+    monkeypatch.setattr(cli, "find_need", lambda *_: True)
+    assert main(["fly"]) == 1
+    assert capsys.readouterr().err == "sunpoint: far enough\n"
+    assert [ros for ros, _ in asked] == ["system"]
+    assert f"python3.{sys.version_info[1]}" in asked[0][1]
 
 
 def test_unknown_verb_without_a_near_one_points_to_the_help():

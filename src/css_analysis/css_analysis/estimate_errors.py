@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How far the estimates of a flight are from its truth, step by step, and whether they know it."""
 
+import math
+
 import numpy as np
 
 from css_analysis.flight_log import FlightLog, angle
@@ -55,13 +57,53 @@ def tangent_nees(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
 def tangent_nees_of(sun_hat_b: Vec3, covariance, sun_b: Vec3) -> float:
     """Normalised error squared of one estimate `sun_hat_b` with its covariance (nine, row-major), as `tangent_nees`."""
     e1, e2 = axes_across(sun_hat_b)
-    c = covariance
-    p = ((c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8]))
-    p_e2 = multiply(p, e2)
-    p11, p12, p22 = dot(e1, multiply(p, e1)), dot(e1, p_e2), dot(e2, p_e2)
+    p11, p12, p22 = _across(e1, e2, covariance)
     error = subtract(sun_b, sun_hat_b)
     a, b = dot(e1, error), dot(e2, error)
     return (p22 * a * a - 2.0 * p12 * a * b + p11 * b * b) / (p11 * p22 - p12 * p12)
+
+
+@kernel
+def _across(e1: Vec3, e2: Vec3, c) -> Vec3:
+    """Covariance (nine, row-major) on two axes: first variance, covariance, second variance."""
+    p = ((c[0], c[1], c[2]), (c[3], c[4], c[5]), (c[6], c[7], c[8]))
+    p_e2 = multiply(p, e2)
+    return dot(e1, multiply(p, e1)), dot(e1, p_e2), dot(e2, p_e2)
+
+
+@kernel
+def _heading_sigmas_of_rows(sun_hat_b, covariance, sigmas_out) -> None:
+    for i in range(sigmas_out.shape[0]):
+        e1, e2 = axes_across(row(sun_hat_b, i))
+        p11, p12, p22 = _across(e1, e2, covariance[i])
+        middle, half = 0.5 * (p11 + p22), 0.5 * (p11 - p22)
+        sigmas_out[i] = math.sqrt(max(middle + math.sqrt(half * half + p12 * p12), 0.0))
+
+
+def heading_sigmas(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Steps of the truth (K,) and what a filter itself holds for one sigma (K,) [rad] of its Sun there.
+
+    It is the larger half axis of its error ellipse across the estimated Sun. Only estimates with a covariance count.
+    """
+    estimates = log.estimates[name]
+    rows, steps = estimated_rows(log, name)
+    has_covariance = estimates.covariance[rows, 0] >= 0.0
+    rows, steps = rows[has_covariance], steps[has_covariance]
+    sigmas = np.empty(len(rows))
+    _heading_sigmas_of_rows(estimates.sun_b[rows], estimates.covariance[rows], sigmas)
+    return steps, sigmas
+
+
+def attitude_sigmas(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Steps of the truth (K,) and what an attitude filter holds for one sigma (K,) [rad] of its attitude there.
+
+    It is the largest half axis of the error ellipsoid of its rotation vector.
+    """
+    rows, steps = estimated_rows(log, name)
+    covariance = log.attitudes[name].covariance[rows].reshape(-1, 6, 6)[:, :3, :3]
+    known = np.isfinite(covariance).all(axis=(1, 2)) & (covariance[:, 0, 0] >= 0.0)
+    rows, steps, covariance = rows[known], steps[known], covariance[known]
+    return steps, np.sqrt(np.maximum(np.linalg.eigvalsh(covariance)[:, -1], 0.0)) if len(rows) else np.empty(0)
 
 
 @kernel

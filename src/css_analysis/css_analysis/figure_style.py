@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """How Sunpoint's figures look: one style, colours that colour-blind readers can tell apart, thin long series."""
 
-from collections.abc import Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +14,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-# Okabe & Ito, "Color Universal Design", 2008; yellow is left out, it is too pale for a line.
-BLUE, ORANGE, GREEN, VERMILION = "#0072B2", "#E69F00", "#009E73", "#D55E00"
-PURPLE, SKY, BLACK, GREY = "#CC79A7", "#56B4E9", "#000000", "#8C8C8C"
-COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, GREY)
-SHADE, DARK_GREY = "#E3E6EA", "#5A5A5A"
+from css_analysis import palette
+
+BLUE, ORANGE, GREEN, VERMILION = palette.BLUE, palette.ORANGE, palette.GREEN, palette.VERMILION
+PURPLE, SKY, BLACK, GREY = palette.PURPLE, palette.SKY, palette.BLACK, palette.GREY
+COLOURS, SHADE, DARK_GREY = palette.COLOURS, palette.SHADE, palette.DARK_GREY
 
 _DPI = 150
 _STYLE: dict[Any, Any] = {
@@ -45,6 +46,8 @@ _LONG = 4  # rows a bin from which a series is binned
 
 Colour = str | tuple[float, ...]
 
+_kept: ContextVar[dict[Path, Figure] | None] = ContextVar("_kept", default=None)
+
 
 def style() -> AbstractContextManager[None]:
     """Context in which figures must be made and saved."""
@@ -61,7 +64,26 @@ def new_figure(width: float, height: float) -> Figure:
 def save(figure: Figure, path: Path) -> Path:
     """Write a PNG; the same figure gives the same bytes."""
     figure.savefig(path, dpi=_DPI, metadata={"Software": None})
+    kept = _kept.get()
+    if kept is not None:
+        kept[path.absolute()] = figure
     return path
+
+
+@contextmanager
+def keep_figures() -> Iterator[dict[Path, Figure]]:
+    """Figures that are saved inside the context, by their absolute paths: for pages that show more than pixels."""
+    kept: dict[Path, Figure] = {}
+    token = _kept.set(kept)
+    try:
+        yield kept
+    finally:
+        _kept.reset(token)
+
+
+def kept_figure(path: Path) -> Figure | None:
+    """The figure that was saved under a path inside `keep_figures`; None: there is none, or nobody keeps them."""
+    return (_kept.get() or {}).get(path.absolute())
 
 
 def colours(count: int) -> Sequence[Colour]:

@@ -10,7 +10,6 @@ from css_analysis.figure_style import colours, new_figure, save, style, subtitle
 from css_analysis.flight_log import FlightLog
 from css_analysis.flight_panels import (
     Panel,
-    TimeAxis,
     draw_heading_error,
     draw_pointing_error,
     draw_true_rate,
@@ -19,8 +18,8 @@ from css_analysis.flight_panels import (
     finish_rate,
     panels_of,
     shade_eclipse,
-    time_axis,
 )
+from css_analysis.flight_series import TimeAxis, time_axis
 
 _WIDTH = 8.6  # [inches]
 _PANEL_HEIGHT = 1.75

@@ -20,49 +20,25 @@ from css_analysis.figure_style import (
     shade_dark,
 )
 from css_analysis.flight_log import FlightLog
-from css_analysis.health_panel import draw_health, has_spells
+from css_analysis.flight_series import (
+    MODES,
+    RPM,
+    TimeAxis,
+    dark_times,
+    error_series,
+    estimator_label,
+)
+from css_analysis.health_panel import draw_health
+from css_analysis.unit_spells import has_spells
 from css_common.message_columns import Columns
-from css_msgs.msg import ControlStatus, SunEstimate
-
-_RPM = 60.0 / (2.0 * np.pi)
-_LEAST_ERROR = 1e-2  # [deg] below it an error is drawn as this, for the logarithmic axis
-_MODES = {
-    ControlStatus.MODE_SAFE: "safe",
-    ControlStatus.MODE_DETUMBLE: "detumble",
-    ControlStatus.MODE_SUN_SEARCH: "search",
-    ControlStatus.MODE_SUN_ACQUISITION: "acquisition",
-    ControlStatus.MODE_SUN_POINT: "point",
-    ControlStatus.MODE_ECLIPSE: "eclipse",
-}
-
-
-class TimeAxis(NamedTuple):
-    """Abscissa of a flight."""
-
-    scale: float  # [s] of one unit
-    label: str
-    first: float  # in its unit
-    last: float
-
-
-def time_axis(log: FlightLog) -> TimeAxis:
-    """From the first to the last message; in minutes when that is longer than ten of them, else in seconds."""
-    spans = [log.time(columns)[[0, -1]] for columns in log.columns()]
-    first, last = min(span[0] for span in spans), max(span[1] for span in spans)
-    scale, label = (60.0, "time [min]") if last - first > 600.0 else (1.0, "time [s]")
-    return TimeAxis(scale, label, first / scale, last / scale)
 
 
 def shade_eclipse(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     """Grey background where the flight is not sunlit; without truth, where an estimator says so."""
-    if log.truth is not None:
-        columns, dark = log.truth, ~log.sunlit
-    elif log.estimates:
-        columns = next(iter(log.estimates.values()))
-        dark = columns.eclipse == SunEstimate.ECLIPSE_ECLIPSED
-    else:
-        return
-    shade_dark(axes, log.time(columns) / unit.scale, dark)
+    shaded = dark_times(log)
+    if shaded is not None:
+        time_s, dark = shaded
+        shade_dark(axes, time_s / unit.scale, dark)
 
 
 def draw_heading_error(axes: Axes, log: FlightLog, unit: TimeAxis, name: str, colour: Colour, label: str) -> None:
@@ -72,11 +48,8 @@ def draw_heading_error(axes: Axes, log: FlightLog, unit: TimeAxis, name: str, co
 
 
 def _draw_errors(axes, log: FlightLog, unit: TimeAxis, steps, errors, colour: Colour, label: str) -> None:
-    degrees = np.maximum(np.degrees(errors), _LEAST_ERROR)
-    time = log.time(log.having("truth"))[steps] / unit.scale
-    spacing = np.diff(steps, prepend=steps[:1])
-    gaps = np.flatnonzero(spacing > 3 * max(np.median(spacing), 1)) if len(steps) else steps
-    draw_series(axes, np.insert(time, gaps, np.nan), np.insert(degrees, gaps, np.nan), colour, label)
+    time_s, degrees = error_series(log, steps, errors)
+    draw_series(axes, time_s / unit.scale, degrees, colour, label)
 
 
 def draw_pointing_error(axes: Axes, log: FlightLog, unit: TimeAxis, colour: Colour, label: str = "") -> None:
@@ -113,9 +86,7 @@ def finish_rate(axes: Axes) -> None:
 
 def _heading_error(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     for name, colour in zip(log.estimates, colours(len(log.estimates)), strict=True):
-        gyro = "gyro" if log.uses_gyro(name) else "no gyro"
-        label = f"{name} ({gyro}{', flown' if name == log.flown else ''})"
-        draw_heading_error(axes, log, unit, name, colour, label)
+        draw_heading_error(axes, log, unit, name, colour, estimator_label(log, name))
     finish_heading_error(axes)
 
 
@@ -143,7 +114,7 @@ def _body_rate(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
 
 def _wheel_speed(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     wheels = log.having("wheels")
-    _draw_all(axes, log, unit, wheels, wheels.speed * _RPM)
+    _draw_all(axes, log, unit, wheels, wheels.speed * RPM)
     axes.set_ylabel("speed [rpm]")
     legend(axes, title="wheel")
 
@@ -170,8 +141,8 @@ def _control_mode(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:
     turns = np.flatnonzero(np.diff(modes)) + 1
     corners = np.unique(np.concatenate(([0], turns - 1, turns, [len(modes) - 1])))
     axes.step(log.time(control)[corners] / unit.scale, modes[corners], where="post", color=BLUE)
-    axes.set_yticks(list(_MODES), list(_MODES.values()))
-    axes.set_ylim(-0.5, len(_MODES) - 0.5)
+    axes.set_yticks(list(MODES), list(MODES.values()))
+    axes.set_ylim(-0.5, len(MODES) - 0.5)
 
 
 def _health(axes: Axes, log: FlightLog, unit: TimeAxis) -> None:

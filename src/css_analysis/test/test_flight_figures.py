@@ -11,7 +11,7 @@ from synthetic_flight import columns, estimates, stamps, tilted, truth
 from css_analysis.figure_style import binned, colours
 from css_analysis.flight_figures import write_figures
 from css_analysis.flight_log import FlightLog
-from css_analysis.flight_panels import time_axis
+from css_analysis.flight_series import time_axis
 from css_common.mission import load_mission
 from css_msgs.msg import ControlStatus, CssVoltages, WheelState
 

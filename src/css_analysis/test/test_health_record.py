@@ -10,8 +10,8 @@ from css_analysis.fault_record import FaultRecord
 from css_analysis.flight_figures import write_figures
 from css_analysis.flight_log import FlightLog
 from css_analysis.flight_summary import isolated_lines
-from css_analysis.health_panel import Spell, has_spells, spells
 from css_analysis.health_record import Detection, HealthRecord, detections, health_records
+from css_analysis.unit_spells import Spell, has_spells, spells
 from css_common.codec import codec_of
 from css_msgs.msg import ControlStatus, Faults, Health, SunEstimate
 

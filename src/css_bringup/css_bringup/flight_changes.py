@@ -6,29 +6,11 @@ which the node took it is not recorded: only that the latest stamp was such and 
 """
 
 from collections.abc import Iterable, Mapping
-from functools import cache
 from typing import Any, NamedTuple
-
-from rosbags.typesys import Stores, get_typestore
-from rosbags.typesys.store import Typestore
 
 from css_common.mission import Event
 from css_common.schema import ParameterError, Table
-
-PARAMETER_EVENTS = "/parameter_events"
-
-# fields of rcl_interfaces/msg/ParameterValue in the order of its types, which begin with 1
-_VALUES = (
-    "bool",
-    "integer",
-    "double",
-    "string",
-    "byte_array",
-    "bool_array",
-    "integer_array",
-    "double_array",
-    "string_array",
-)
+from css_recording.parameter_events import RecordedSetting
 
 
 class ParameterChange(NamedTuple):
@@ -40,40 +22,6 @@ class ParameterChange(NamedTuple):
     def text(self) -> str:
         """The values as KEY=VALUE."""
         return ", ".join(f"{key}={value}" for key, value in self.values.items())
-
-
-class RecordedSetting(NamedTuple):
-    """A message of /parameter_events."""
-
-    stamp_ns: int
-    node: str
-    values: Mapping[str, Any]
-
-
-def read_setting(data: bytes, stamp_ns: int) -> RecordedSetting:
-    """The parameters that a message of /parameter_events says have changed.
-
-    Args:
-        data: the serialised message.
-        stamp_ns: latest stamp of the flight when it was recorded.
-    """
-    event: Any = _types().deserialize_cdr(data, "rcl_interfaces/msg/ParameterEvent")
-    values = {parameter.name: _value(parameter.value) for parameter in event.changed_parameters}
-    return RecordedSetting(stamp_ns, event.node.rsplit("/", 1)[-1], values)
-
-
-@cache
-def _types() -> Typestore:
-    # only recordings with such messages pay for all the types of ROS
-    return get_typestore(Stores.ROS2_JAZZY)
-
-
-def _value(told: Any) -> Any:
-    """What a ParameterValue holds; None when that is nothing."""
-    if not 1 <= told.type <= len(_VALUES):
-        return None
-    value = getattr(told, f"{_VALUES[told.type - 1]}_value")
-    return value.tolist() if hasattr(value, "tolist") else value
 
 
 def settings_in_flight(

@@ -88,6 +88,7 @@ def monte_carlo_command(executable: str, arguments: argparse.Namespace, albedo: 
         "--duration", str(arguments.duration),
         "--set", f"css_array.albedo.enabled={'true' if albedo else 'false'}",
         "--set", "css_array.albedo.factor=1.0",  # the Earth as it is, as in Basilisk
+        "--no-report",
         "--json",
     ]  # fmt: skip
 

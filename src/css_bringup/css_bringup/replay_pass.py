@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Mapping
 
 from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest, parse_request
-from css_bringup.flight_changes import PARAMETER_EVENTS, RecordedSetting, read_setting
 from css_bringup.replay_stretch import Stretch, stretches
 from css_bringup.replayed import Replayed, replayed
 from css_common.codec import DecodeError, Sample, codec_of, stamp_of, type_name
@@ -21,6 +20,7 @@ from css_common.mission_file import MissionError
 from css_recording.bag_metadata import Topic, absolute
 from css_recording.bag_reader import BagMessage, BagReader
 from css_recording.bag_writer import BagWriter
+from css_recording.parameter_events import PARAMETER_EVENTS, RecordedSetting, read_setting
 
 __all__ = ["EstimatorRequest", "Replay", "parse_request"]
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest
-from css_bringup.flight_changes import ParameterChange, RecordedSetting, settings_in_flight
+from css_bringup.flight_changes import ParameterChange, settings_in_flight
 from css_bringup.retracing import Given, Retrace
 from css_common.component import Cycles, Input, Output, Received
 from css_common.matching import Matcher
@@ -17,6 +17,7 @@ from css_common.schema import shaped_values
 from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
 from css_recording.bag_metadata import absolute
+from css_recording.parameter_events import RecordedSetting
 
 ESTIMATORS = "css_estimation"
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from synthetic_flight import EPOCH_NS, estimates, stamps, tilted, truth
 
+from css_analysis.faults_flown import faults_flown
 from css_analysis.flight_log import read_flight
-from css_bringup.faults_flown import faults_flown
 from css_bringup.flight_result import FlightResult
 from css_bringup.verbs.fly import conclude
 from css_common.codec import codec_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from css_bringup.comparison import Comparison
-from css_bringup.flight_changes import ParameterChange, RecordedSetting, settings_in_flight
+from css_bringup.flight_changes import ParameterChange, settings_in_flight
 from css_bringup.retracing import Retrace
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Output
@@ -15,6 +15,7 @@ from css_common.mission import Event
 from css_common.schema import checked_values, real
 from css_common.stepping import Stepper
 from css_msgs.msg import SunEstimate
+from css_recording.parameter_events import RecordedSetting
 
 STEP = 100_000_000
 CODEC = codec_of(SunEstimate)

@@ -109,7 +109,8 @@ def first_track(recorded: Recorded, around: Surroundings) -> tuple[Track, np.nda
             "of all three"
         )
     windows = [rows[knot == k] for k in range(len(times))]
-    candidates, costs = [], []
+    candidates: list[np.ndarray] = []
+    costs: list[np.ndarray] = []
     for k, window in enumerate(windows):
         # the last knot of a run has no instants of its own
         if not len(window):
@@ -138,7 +139,10 @@ def _windows(
     recorded: Recorded, lit: np.ndarray, stretch: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Instants in windows, the knot before each, time of each knot [s], and the run that each knot belongs to."""
-    chosen, knots, times, runs = [], [], [], []
+    chosen: list[np.ndarray] = []
+    knots: list[np.ndarray] = []
+    times: list[float] = []
+    runs: list[int] = []
     time = recorded.time
     rows = np.flatnonzero(lit)
     new_run = np.flatnonzero((np.diff(stretch[rows]) != 0) | (np.diff(time[rows]) > 2.0 * KNOT_S)) + 1

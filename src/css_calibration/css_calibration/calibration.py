@@ -46,7 +46,7 @@ class Calibration:
         fit: of the cells, and of the track where there is one.
         left: (N, 5) what is left of the ignorance of each parameter, 0 to 1.
         track: of a batch.
-        bias, field: of gyro and magnetometer with a truth.
+        bias, of_field: of gyro and magnetometer with a truth.
         holdout: (M,) instants that the numbers below come from; the fit behind these did not have their outputs.
         before, after: (H,) [rad] errors of the heading there, with nominal cells and calibrated ones.
         notes: what was assumed, left out or could not be told, one line each.
@@ -61,7 +61,7 @@ class Calibration:
     left: np.ndarray
     track: Track | None
     bias: Linear | None
-    field: Linear | None
+    of_field: Linear | None
     holdout: np.ndarray
     before: np.ndarray
     after: np.ndarray

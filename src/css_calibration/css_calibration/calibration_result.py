@@ -11,9 +11,10 @@ import numpy as np
 from css_calibration.attitude_track import BIAS, COMMON_SIGMA, FIELD_BIAS, FIELD_SCALE, SOFT_IRON
 from css_calibration.calibration import Calibration
 from css_calibration.cell_fit_model import DARK, GAIN, KAPPA, TILT_1, TILT_2, normals_of
-from css_calibration.unknowns import is_observed, weak_directions
+from css_calibration.unknowns import weak_directions
 from css_common.epochs import format_utc
 from css_common.mission_file import dump_sections
+from css_estimation.sun_filter.calibration_report import OBSERVED
 
 _BINS_DEG = (0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 90.0)
 _CELL_ROWS = (
@@ -55,9 +56,7 @@ def rows_of(c: Calibration) -> list[Row]:
     if c.fit.unknowns.earth:
         place = c.fit.unknowns.count - 1
         left = math.sqrt(c.fit.covariance[place, place])
-        rows.append(
-            Row("earth", None, c.fit.earth, left * c.fit.unknowns.ignorance.earth, "-", bool(is_observed(left)))
-        )
+        rows.append(Row("earth", None, c.fit.earth, left * c.fit.unknowns.ignorance.earth, "-", left < OBSERVED))
     return rows + list(_aid_rows(c))
 
 
@@ -68,12 +67,12 @@ def _aid_rows(c: Calibration) -> Iterator[Row]:
         values, sigmas = common
     if c.bias is not None:
         values[BIAS], sigmas[BIAS] = c.bias.x, c.bias.sigma
-    if c.field is not None:
-        values[3:], sigmas[3:] = c.field.x, c.field.sigma
+    if c.of_field is not None:
+        values[3:], sigmas[3:] = c.of_field.x, c.of_field.sigma
     for name, place, axes, unit, factor in _AIDS:
         for axis, value, sigma, before in zip(axes, values[place], sigmas[place], COMMON_SIGMA[place], strict=True):
             if math.isfinite(sigma):
-                told = bool(is_observed(sigma / before))
+                told = bool(bool(sigma / before < OBSERVED))
                 yield Row(f"{name}_{axis}", None, factor * value if told else 0.0, factor * sigma, unit, told)
 
 

@@ -8,15 +8,17 @@ what it reads in the dark, whatever its attitude.
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from css_calibration.cell_fit_model import normals_of, predict_cells
 from css_calibration.recorded import Recorded
 from css_calibration.surroundings import Surroundings, earth_light
+from css_common.direction_grid import grid_cell
 from css_common.kernel import typed_call
 from css_estimation.sun_filter.options import Response
-from css_sensors.cells import half_view_cosine, plane_sides
+from css_sensors.cells import blocked_directions, half_view_cosine, own_view_cosines, plane_sides
 
 EDGE_DEG = 8.0
 """So near to the edge of its view a cell says nothing about its tilt."""
@@ -61,7 +63,8 @@ class CellData:
     def some(self, rows: np.ndarray) -> "CellData":
         """The same at some of the instants."""
         columns = ("voltages", "sun_b", "intensity", "seen", "usable", "albedo", "warmth", "time")
-        return replace(self, **{name: np.ascontiguousarray(getattr(self, name)[rows]) for name in columns})
+        chosen: dict[str, Any] = {name: np.ascontiguousarray(getattr(self, name)[rows]) for name in columns}
+        return replace(self, **chosen)
 
     def predicted(self, parameters: np.ndarray, earth: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Outputs (M, N), derivatives by parameters (M, N, 6) and by the Sun vector (M, N, 3)."""
@@ -83,7 +86,9 @@ def sun_in_view(recorded: Recorded, sun_b: np.ndarray) -> tuple[np.ndarray, np.n
     normals_b = np.asarray(values.cells.normals, dtype=np.float64)
     cosine = np.clip(sun_b @ normals_b.T, -1.0, 1.0)
     angle = np.degrees(np.arccos(cosine))
-    half = math.degrees(math.acos(min(1.0, max(-1.0, half_view_cosine(values)))))
+    own = own_view_cosines(values)
+    cosines = own if len(own) else np.array([half_view_cosine(values)])
+    half = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
     seen = angle <= half
     sure = np.abs(angle - half) > EDGE_DEG
     sides = plane_sides(values)
@@ -93,6 +98,11 @@ def sun_in_view(recorded: Recorded, sun_b: np.ndarray) -> tuple[np.ndarray, np.n
     sure &= ~clipped | (np.abs(above) > math.sin(math.radians(_PLANE_DEG)))[:, None]
     # away from every view nothing is in doubt
     sure |= angle > half + EDGE_DEG
+    masks = blocked_directions(values)
+    if len(masks):
+        where = np.array([grid_cell.py_func(tuple(s)) if np.isfinite(s).all() else 0 for s in sun_b.tolist()])
+        hidden = (masks[where][:, None] >> np.arange(len(normals_b), dtype=np.uint32) & 1).astype(bool)
+        seen &= ~hidden
     return seen, sure
 
 

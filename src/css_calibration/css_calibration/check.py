@@ -47,6 +47,7 @@ _ABSOLUTE, _SHARE, _EARTH, _CLOUDED = 0.08, 0.35, 0.3, 3.0  # bounds on cells th
 _SIGMAS, _LEAST_OFF = 5.0, 0.03  # bounds on calibrated ones
 _LEAPS = 5.0 * math.sqrt(6.0)
 _LEAP_SHARE = 0.15
+_FASTEST = 0.1  # [rad/s] of a body whose rate is not recorded
 _SCALE, _LEVEL = 0.35, 0.12  # a calibration beyond them is a fault
 _CALIBRATED = 0.1  # of scale, 1 sigma
 _SEVERAL = 3
@@ -147,7 +148,8 @@ def _by_themselves(recorded: Recorded) -> tuple[np.ndarray, np.ndarray]:
     noise = 1.4826 * np.nanmedian(second, axis=0) / math.sqrt(6.0)
     largest = np.fmax(np.fmax(v[2:], v[1:-1]), v[:-2])
     # a body that turns by so much between samples makes second differences, too
-    turn = 0.1 * recorded.period_s
+    rates = np.linalg.norm(recorded.gyro_b, axis=1)
+    turn = (float(np.percentile(rates, 95.0)) if len(rates) else _FASTEST) * recorded.period_s
     usual = max(float(np.nanmedian(noise)), 1e-4)
     limit = np.maximum(_LEAPS * usual, _LEAP_SHARE * largest) + 3.0 * min(turn, 0.3) ** 2
     leaps[2:] = second > limit
@@ -193,13 +195,14 @@ def _outputs(
 ) -> Outputs:
     expected, low, high = bounds
     known = data.usable | (thin.saturated & np.isfinite(thin.voltages) & _usable_but_for_limit(thin, data))
+    # at the edge of its view a healthy cell leaps, too: there the light is not known
     bad = known & ((thin.voltages < low) | (thin.voltages > high))
-    return Outputs(thin.time, thin.voltages, np.where(known, expected, np.nan), bad, leaps, same)
+    return Outputs(thin.time, thin.voltages, np.where(known, expected, np.nan), bad, leaps & known, same)
 
 
 def _usable_but_for_limit(thin: Recorded, data: CellData) -> np.ndarray:
     """Outputs at the limit of a converter, where the light is known all the same."""
-    others = data.usable.any(axis=1)[:, None]
+    others = np.any(data.usable, axis=1, keepdims=True)
     return others & (thin.voltages <= thin.mission.values[LARGEST_READING])
 
 

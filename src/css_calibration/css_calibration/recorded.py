@@ -123,7 +123,8 @@ def read_recorded(path: str | Path, mission: Mission | None = None, remap: Mappi
         CalibrationError: it holds no cell outputs, or no mission although none is given.
     """
     with BagReader(path, remap) as reader:
-        text, notes = reader.mission_text, []
+        text = reader.mission_text
+        notes: list[str] = []
         if mission is None and text is None:
             raise CalibrationError(f"{path}: holds no mission; whose cells are these? --mission NAME says it")
         if mission is None:

@@ -13,7 +13,7 @@ from css_estimation.sun.direction_grid import direction
 PATCHES = 300
 """Patches of the sphere: 12 deg from one to the next."""
 _LOSS = 0.25  # of the light
-_LEAST_IN_PATCH, _LEAST_SHADED = 2, 15
+_LEAST_IN_PATCH, _LEAST_SHADED = 2, 10
 _PURE = 0.8  # share of the lit outputs of a shaded patch that are shaded
 _VISITS = 2  # apart in time, with light from other directions between
 
@@ -63,7 +63,7 @@ def shadows_of(data: CellData, result: Fit, cell: int) -> Shadow | None:
         f"of ({centre[0]:.2f}, {centre[1]:.2f}, {centre[2]:.2f}), on average {100.0 * float(loss[inside].mean()):.0f} %"
     )
     return Shadow(
-        tuple(tuple(float(c) for c in middle) for middle in middles[is_dark].round(3)), int(inside.sum()), int(first),
+        tuple((float(x), float(y), float(z)) for x, y, z in middles[is_dark].round(3)), int(inside.sum()), int(first),
         int(last), evidence,
     )  # fmt: skip
 

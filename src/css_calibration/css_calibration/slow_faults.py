@@ -15,6 +15,7 @@ _TIMES, _LEAST_NOISE = 3.0, 0.008
 _BLOCKS = 8
 _FEWEST = 12  # lit outputs of a block
 _SIGMAS, _CHANGE = 6.0, 0.06
+_STEP = 0.85  # of the squares that a line leaves, below which a step is the better story
 _STEADY = 0.5  # share of the change that a straight line explains
 
 
@@ -54,10 +55,12 @@ def ageing(data: CellData, result: Fit, cell: int) -> Slow | None:
     median = np.array([np.median(ratio[b]) for b in blocks])
     spread = np.array([1.4826 * np.median(np.abs(ratio[b] - m)) for b, m in zip(blocks, median, strict=True)])
     sigma = np.maximum(1.25 * spread / np.sqrt([len(b) for b in blocks]), 2e-3)
-    off = time - time.mean()
-    slope = float(np.sum(off * median / sigma**2) / np.sum(off**2 / sigma**2))
-    error = float(1.0 / np.sqrt(np.sum(off**2 / sigma**2)))
-    line = median.mean() + slope * off
+    weight = 1.0 / sigma**2
+    off = time - np.average(time, weights=weight)
+    level = np.average(median, weights=weight)
+    slope = float(np.sum(off * (median - level) * weight) / np.sum(off**2 * weight))
+    error = float(1.0 / np.sqrt(np.sum(off**2 * weight)))
+    line = level + slope * off
     explained = 1.0 - np.var(median - line) / max(float(np.var(median)), 1e-12)
     span = slope * (data.time[rows[-1]] - data.time[rows[0]])
     if abs(slope) < _SIGMAS * error or abs(span) < _CHANGE or explained < _STEADY:
@@ -76,4 +79,4 @@ def _is_step(time: np.ndarray, values: np.ndarray) -> bool:
     after = (squares[-1] - squares[:-1]) - (sums[-1] - sums[:-1]) ** 2 / (len(values) - count)
     slope, level = np.polyfit(time - time[0], values, 1)
     line = float(np.sum((values - level - slope * (time - time[0])) ** 2))
-    return float(np.min(before + after)) < line
+    return float(np.min(before + after)) < _STEP * line

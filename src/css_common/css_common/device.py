@@ -52,7 +52,7 @@ class Device(Component):
     def readings(self, stop: Stop) -> Iterator[Reading]:
         """What the device gives, each as it comes, until told to stop; runs in a thread of its own.
 
-        Whatever goes wrong with the device is dealt with in here.
+        Whatever goes wrong with the device is dealt with in here; when it ends or raises, its host begins it anew.
         """
 
     @abstractmethod

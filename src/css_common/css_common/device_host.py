@@ -12,6 +12,7 @@ from css_common.device import READING, Device, Reading, Stop
 from css_common.host import ComponentNode
 
 _PATIENCE = 5.0  # wall time [s] within which a device must notice that it is to stop
+_AFTER_FAILURE = 1.0  # wall time [s]
 _MOST_WAITING = 64  # readings; more than that means that the node does not come to them
 
 
@@ -60,19 +61,23 @@ class DeviceNode(ComponentNode):
         self._stop = self._thread = None
 
     def _read(self, component: Device, stop: Stop, readings: SimpleQueue) -> None:
-        """The thread."""
-        try:
-            for reading in component.readings(stop):
-                if stop:
-                    return
-                if readings.qsize() >= _MOST_WAITING:
-                    self.counters["readings_dropped"] += 1
-                    continue
-                readings.put(reading)
-                self._come()
-        except Exception as error:
-            readings.put(error)
-            self._come()
+        """The thread; what a driver did not foresee costs a second, and it begins anew."""
+        while not stop:
+            try:
+                for reading in component.readings(stop):
+                    if stop:
+                        return
+                    self._hand_over(reading, readings)
+            except Exception as error:
+                self._hand_over(error, readings)
+            stop.within(_AFTER_FAILURE)
+
+    def _hand_over(self, reading: Reading | Exception, readings: SimpleQueue) -> None:
+        if readings.qsize() >= _MOST_WAITING:
+            self.counters["readings_dropped"] += 1
+            return
+        readings.put(reading)
+        self._come()
 
     def _come(self) -> None:
         executor = self.executor

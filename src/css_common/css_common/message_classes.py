@@ -104,7 +104,7 @@ def message_class(package: str, file: Path) -> type[MessageClass]:
         "SLOT_TYPES": tuple(slots.values()),
         "_fields_and_field_types": {name: _text(slot) for name, slot in slots.items()},
         # generated classes have a byte as bytes
-        **{name: bytes([value]) if kind == "byte" else value for name, kind, value in constants},
+        **{name: bytes([int(value)]) if kind == "byte" else value for name, kind, value in constants},
     }
     return type(file.stem, (MessageClass,), members)
 

@@ -8,7 +8,7 @@ nobody declares, so each reader checks the whole file here first and a typo dies
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -67,6 +67,8 @@ __all__ = [
 ]
 
 _SCRIPTS = ("events.", "criteria.", SECTION, dispersions.SECTION)
+GRAPH_NODES = "graph.nodes"
+"""Parameter that lists the nodes of the graph."""
 _OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
 _MOST_NODES = 64
 
@@ -265,14 +267,27 @@ class Mission:
             MissionError: a key that no section has, or a value that its specification refuses.
         """
         parameters: Sections = self.parameters
-        for override in overrides:
+        texts = list(overrides)
+        tables = self._tables_with(texts)
+        for override in texts:
             key, separator, text = override.partition("=")
             if not separator:
                 raise MissionError(f"{shown(override)} is no override, expected KEY=VALUE")
-            node, specification = self._find(key.strip())
+            node, specification = self._find(key.strip(), tables)
             value = _parsed(key.strip(), specification, text)
             parameters = _placed(parameters, key.strip(), node, specification, value)
         return self._with(parameters)
+
+    def _tables_with(self, overrides: Sequence[str]) -> dict[str, Table]:
+        """Parameters of each node of the graph, as it is once overrides are applied: they may bring a node."""
+        tables = {node.name: node.component.table() for node in self.nodes}
+        for override in overrides:
+            key, _, text = override.partition("=")
+            if key.strip() == GRAPH_NODES:
+                for entry in _parsed(GRAPH_NODES, shared_parameters()[GRAPH_NODES], text):
+                    package, executable, name = parse_node_entry(entry, self.origin)
+                    tables[name] = find_component(package, executable, self.origin).table()
+        return tables
 
     def with_drawn(self, values: Mapping[str, Any], case: int) -> "Mission":
         """The mission with values in canonical form by key, for a case; it disperses nothing any more.
@@ -334,8 +349,9 @@ class Mission:
         """The mission as a parameter file: what was given, overrides applied."""
         return dump_sections(self.parameters)
 
-    def _find(self, key: str) -> tuple[str | None, Parameter]:
+    def _find(self, key: str, tables: Mapping[str, Table] | None = None) -> tuple[str | None, Parameter]:
         """The node that a parameter belongs to, None when all share it, and its specification."""
+        tables = self._tables_with(()) if tables is None else tables
         shared = shared_parameters()
         if key in shared:
             return None, shared[key]
@@ -344,11 +360,11 @@ class Mission:
             return None, other
         head, _, rest = key.partition(".")
         known = [*shared]
-        for node in self.nodes:
-            for parameter in node.component.table():
-                if node.name == head and parameter.name == rest:
-                    return node.name, parameter
-                known.append(f"{node.name}.{parameter.name}")
+        for name, table in tables.items():
+            for parameter in table:
+                if name == head and parameter.name == rest:
+                    return name, parameter
+                known.append(f"{name}.{parameter.name}")
         raise MissionError(f"override {unknown_name(key, known)}")
 
     def _build_nodes(self) -> tuple[Node, ...]:

@@ -361,7 +361,7 @@ MISSION_ERRORS = {
     "name: " + "ü" * 51: "expected a name for files of at most 100 bytes",
     "duration: 0.05": "mission.duration: 0.05 s given, 0.5 steps of mission.period 0.1 s, expected 1 to",
     "duration: 3.2e+7\n      period: 0.001": "mission.duration: 3.2e+07 s given, 3.2e+10 steps",
-    "duration: 1e+300": "mission.duration: 1e+300 given, expected above 0 and at most 3.2e+07 [s]",
+    "duration: 1e+300": "mission.duration: 1e+300 given, expected above 0 and at most 3.2e+08 [s]",
     "epoch: 9999-12-31": "9999-12-31 given, expected one between 1970-01-01 and 2038-01-19: ",
     "epoch: 9999-12-31T23:59:59-23:59": "between 1970-01-01 and 2038-01-19",
     "epoch: 0001-01-01T00:00:00+23:59": "between 1970-01-01 and 2038-01-19",

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_analysis.body_axes import axes_about
 from css_common.case_faults import NEVER
 from css_common.component import Component
 from css_common.kernel import outer_kernel
@@ -54,11 +55,7 @@ class CellMap(NamedTuple):
 
 def grid_about(array_normal_b: Vec3, polar_cells: int = POLAR_CELLS, azimuth_cells: int = AZIMUTH_CELLS) -> Grid:
     """A grid about a unit vector in b; azimuth zero is towards the body's x axis (y, when x is the normal)."""
-    third = np.asarray(array_normal_b, dtype=np.float64)
-    start = np.eye(3)[0] if abs(third[0]) < 0.9 else np.eye(3)[1]
-    second = np.cross(third, start)
-    second /= np.linalg.norm(second)
-    axes = np.array([np.cross(second, third), second, third])
+    axes = axes_about(array_normal_b)
     polar = (np.arange(polar_cells) + 0.5) * (math.pi / polar_cells)
     azimuth = (np.arange(azimuth_cells) + 0.5) * (2.0 * math.pi / azimuth_cells)
     weight = np.sin(polar)

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.image import AxesImage
 
+from css_analysis.body_axes import map_coordinates
 from css_analysis.figure_style import DARK_GREY, VERMILION, new_figure, save, style, subtitle
 from css_monte_carlo.coverage import CellMap, Grid
 
@@ -28,7 +29,7 @@ def write_coverage_figures(
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    at = _map_coordinates(grid, normals_b)
+    at = map_coordinates(grid.axes, normals_b)
     title = "Error of the weighted average"
     return [
         _write_counts(grid, ideal, at, subject, folder / "cells_in_view.png"),
@@ -96,13 +97,6 @@ def _draw_map(axes: Axes, values: np.ndarray, **style_of_image: Any) -> AxesImag
     for spine in axes.spines.values():
         spine.set_visible(True)
     return image
-
-
-def _map_coordinates(grid: Grid, vectors_b: np.ndarray) -> np.ndarray:
-    """(N, 2) azimuth and polar angle [deg] of vectors in the map."""
-    x, y, z = np.array(grid.axes) @ np.asarray(vectors_b).T
-    azimuth = np.degrees(np.arctan2(y, x)) % 360.0
-    return np.column_stack([azimuth, np.degrees(np.arctan2(np.hypot(x, y), z))])
 
 
 def _mark_cells(axes: Axes, cells: np.ndarray) -> None:

@@ -18,51 +18,7 @@ from css_common.message_columns import Columns
 from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
-from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper
-from css_monte_carlo.mission_parts import is_attitude
-
-
-def configured(
-    mission: Mission, *, case: int | None = None, estimator: str | None = None, gyro: bool = True
-) -> Mission:
-    """A mission with another case, another Sun estimator in the place of the one that flies, the gyro on or off.
-
-    An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then switched for it.
-
-    Raises:
-        MissionError: there is no such estimator, or it uses no gyro and shall fly without.
-    """
-    if case is not None:
-        mission = mission.with_overrides([f"mission.case={case}"])
-    flown = mission.values.graph.estimator
-    name = flown if estimator is None else estimator
-    if name != flown and not is_attitude_filter(mission, name):
-        mission = _with_estimator(mission, name)
-    if not uses_gyro(mission.node(name).component):
-        if not gyro:
-            raise MissionError(f"{mission.origin}: gyro off given, but {name} uses no gyro; expected gyro on for it")
-        return mission
-    return mission.with_overrides([f"{name}.use_gyro={'true' if gyro else 'false'}"])
-
-
-def is_attitude_filter(mission: Mission, name: str) -> bool:
-    """Whether a node of the graph estimates attitude."""
-    return any(node.name == name and is_attitude(node) for node in mission.nodes)
-
-
-def _with_estimator(mission: Mission, estimator: str) -> Mission:
-    """A mission in which another Sun estimator flies, from the graph or in the place of the one that flew."""
-    flown = mission.values.graph.estimator
-    names = [node.name for node in mission.nodes]
-    overrides = [f"graph.estimator={estimator}"]
-    if estimator not in names and flown in names:
-        entry = f"{mission.node(flown).package}/{estimator}"
-        nodes = [
-            entry if name == flown else listed for name, listed in zip(names, mission.values.graph.nodes, strict=True)
-        ]
-        overrides.insert(0, f"graph.nodes={','.join(nodes)}")
-    return mission.with_overrides(overrides)
 
 
 def fly_directly(mission: Mission) -> FlightLog:

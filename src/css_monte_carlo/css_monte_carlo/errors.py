@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is wrong with a study."""
 
+from css_analysis.study_record import StudyError
 
-class StudyError(Exception):
-    """A study that cannot be made, resumed or read; the message says why in one line."""
+__all__ = ["StudyError"]

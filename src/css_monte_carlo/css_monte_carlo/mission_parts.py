@@ -3,13 +3,14 @@
 
 from typing import NamedTuple
 
+from css_analysis.configured_mission import is_attitude
 from css_common.component import Component
 from css_common.mission import Mission, MissionError, Node
 from css_estimation.calibrated_readings import is_calibrated
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sun_estimator import SunEstimator
-from css_msgs.msg import AttitudeEstimate, SunEstimate
+from css_msgs.msg import SunEstimate
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
@@ -68,11 +69,6 @@ def parts_of(mission: Mission, estimator: str | None = None) -> Parts:
         raise _no_place(mission, f"{node.name} does not control, and the compiled loop flies one Sun estimator")
     _check_events(mission, parts)
     return parts
-
-
-def is_attitude(node: Node) -> bool:
-    """Whether a node estimates attitude, by the message that it publishes."""
-    return any(output.message_type is AttitudeEstimate for output in node.outputs)
 
 
 def is_heading(node: Node) -> bool:

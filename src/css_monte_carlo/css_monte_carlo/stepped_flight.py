@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 
+from css_analysis.configured_mission import is_attitude
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission, MissionError
 from css_common.random_streams import RandomKey, random_key
@@ -18,7 +19,7 @@ from css_monte_carlo.direct_flight import fly_checked
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.log_tallies import tally_attitudes, tally_headings
 from css_monte_carlo.measures import ATTITUDE, HEADING, CaseTallies
-from css_monte_carlo.mission_parts import is_attitude, is_heading
+from css_monte_carlo.mission_parts import is_heading
 from css_sim import gyro, initial_conditions
 from css_sim.flight_checks import MotionError
 from css_sim.nodes.dynamics import Dynamics

@@ -10,7 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.configured_mission import configured, is_attitude_filter
 from css_analysis.flight_metrics import Windows, windows_of
+from css_analysis.study_record import StudyRecord, read_record
 from css_common.kernel import study_hash
 from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight, report
@@ -18,7 +20,7 @@ from css_monte_carlo import chunk
 from css_monte_carlo.attitude_guess import takes_guess
 from css_monte_carlo.case_missions import drawn_names
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.direct_flight import configured, is_attitude_filter, refuse_what_needs_the_graph
+from css_monte_carlo.direct_flight import refuse_what_needs_the_graph
 from css_monte_carlo.drawn_faults import COLUMN, has_faults
 from css_monte_carlo.measures import ATTITUDE, HEADING, Measure
 from css_monte_carlo.mission_parts import NoPlace, parts_of
@@ -59,25 +61,15 @@ class Configuration(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Study:
-    """A complete study.
+class Study(StudyRecord):
+    """A complete study, and what it cost.
 
     Attributes:
-        folder: where it lies.
-        manifest: what was asked for.
-        cases: one row per configuration and case: estimator, gyro, overrides, case and the quantities of `measures`;
-            null what is not of the kind of the estimator. With faults in the mission, `faults` lists those of the case;
-            `drawn.KEY` is what the case drew for a dispersed parameter.
-        percentiles: one row per configuration, quantity and time: count, mean, p05 to p95 over the cases.
         cpu_s: processor time of the loop in this run, 0 for a study that was there.
         flown: case-steps flown in this run.
         warnings: what the checks before the flights found doubtful, in this run.
     """
 
-    folder: Path
-    manifest: dict[str, Any]
-    cases: pa.Table
-    percentiles: pa.Table
     cpu_s: float = 0.0
     flown: int = 0
     warnings: tuple[str, ...] = ()
@@ -89,7 +81,8 @@ def read_study(folder: str | Path) -> Study:
     Raises:
         StudyError: it is not there, not complete or damaged.
     """
-    return Study(Path(folder), *StudyFolder(Path(folder)).read())
+    record = read_record(folder)
+    return Study(record.folder, record.manifest, record.cases, record.percentiles)
 
 
 def run_study(
@@ -183,7 +176,7 @@ def run_study(
         _merged_cases(store, parts),
         _merged_percentiles(store, parts, sample_every * mission.period_ns * 1e-9),
     )
-    return Study(Path(folder), *store.read(), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
+    return replace(read_study(folder), cpu_s=cpu_s, flown=flown_steps, warnings=warnings)
 
 
 def _why_stepped(mission: Mission, estimator: str) -> str | None:

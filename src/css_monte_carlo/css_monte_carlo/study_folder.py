@@ -17,9 +17,9 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from css_monte_carlo.errors import StudyError
+from css_analysis.study_record import CASES, MANIFEST, PERCENTILES, StudyError, is_complete
 
-MANIFEST, CASES, PERCENTILES, CHUNKS = "study.json", "cases.parquet", "percentiles.parquet", "chunks"
+CHUNKS = "chunks"
 
 
 class StudyFolder:
@@ -60,7 +60,7 @@ class StudyFolder:
     @property
     def complete(self) -> bool:
         """All results are there."""
-        return (self.path / PERCENTILES).exists()
+        return is_complete(self.path)
 
     def has_chunk(self, name: str) -> bool:
         """That piece is done."""
@@ -93,20 +93,6 @@ class StudyFolder:
             shutil.rmtree(self.path / CHUNKS)
         except OSError as error:
             raise StudyError(f"{self.path}: cannot be written: {error.strerror}") from error
-
-    def read(self) -> tuple[dict[str, Any], pa.Table, pa.Table]:
-        """Parameters, cases and percentiles of a complete study.
-
-        Raises:
-            StudyError: it is not there, not complete or damaged.
-        """
-        if not self.complete:
-            raise StudyError(f"{self.path}: holds no complete study")
-        try:
-            manifest = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
-            return manifest, pq.read_table(self.path / CASES), pq.read_table(self.path / PERCENTILES)
-        except (OSError, ValueError, pa.ArrowException) as error:
-            raise StudyError(f"{self.path}: damaged: {error}") from error
 
     def _chunk(self, name: str) -> Path:
         return self.path / CHUNKS / f"{name}.parquet"

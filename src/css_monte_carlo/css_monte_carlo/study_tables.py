@@ -9,10 +9,10 @@ from rich.console import Console
 from css_analysis.intervals import beyond_largest
 from css_analysis.quantities import Summary
 from css_analysis.readable_table import ReadableTable
+from css_analysis.study_summary import summaries_of
 from css_common.drawn_mission import assignments
 from css_monte_carlo.sensitivity import Sensitivity
 from css_monte_carlo.study import Study
-from css_monte_carlo.study_summary import summaries_of
 from css_monte_carlo.worst_case import Worst
 
 

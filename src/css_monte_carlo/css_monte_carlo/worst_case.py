@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from css_analysis.flight_metrics import windows_of
+from css_analysis.study_summary import rows_of, summaries_of
 from css_common.drawn_mission import values_at
 from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight
@@ -28,7 +29,6 @@ from css_monte_carlo.errors import StudyError
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.study import Configuration, Study
-from css_monte_carlo.study_summary import rows_of, summaries_of
 
 FILE = "worst.yaml"
 """Mission of the worst case in the folder of a study."""

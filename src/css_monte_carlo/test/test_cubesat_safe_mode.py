@@ -10,13 +10,13 @@ import pyarrow as pa
 import pytest
 
 from css_analysis.flight_metrics import windows_of
+from css_analysis.study_criteria import judge, refuse_unknown_criteria
 from css_common.mission import MissionError, load_mission, mission_from_text
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.commands.monte_carlo import main
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.study import Study
-from css_monte_carlo.study_criteria import judge, refuse_unknown_criteria
 
 NAME = "cubesat_3u_safe"
 CASES = np.arange(6)

@@ -10,12 +10,13 @@ import pytest
 from presence import present
 from synthetic_flight import record
 
+from css_analysis.configured_mission import configured
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import read_flight
 from css_analysis.flight_metrics import sunlit_passes
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
-from css_monte_carlo.direct_flight import configured, fly_directly
+from css_monte_carlo.direct_flight import fly_directly
 from css_msgs.msg import SunEstimate
 
 TEN_MINUTES = "mission.duration=600"

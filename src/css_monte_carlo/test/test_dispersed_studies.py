@@ -76,8 +76,8 @@ def test_surroundings_are_shared_where_nothing_changes_them():
     flight = MissionFlight(mission(*DISPERSED), "ekf")
     shared, alone = flight.around_case(2), MissionFlight(drawn(mission(*DISPERSED, "mission.case=2")).mission, "ekf")
     assert shared.surroundings is flight.surroundings
-    for one, other in zip(shared.surroundings.block(0, 40)[:-1], alone.surroundings.block(0, 40)[:-1], strict=True):
-        np.testing.assert_array_equal(one, other)
+    for here, there in zip(shared.surroundings.block(0, 40)[:-1], alone.surroundings.block(0, 40)[:-1], strict=True):
+        np.testing.assert_array_equal(here, there)
 
 
 def test_the_worst_flight_is_the_one_that_its_file_flies(study):
@@ -111,14 +111,14 @@ def test_indices_of_a_known_function():
 
 
 def test_the_command_prints_what_matters(tmp_path, capsys):
-    arguments = ["okeefe_2013", "--cases", "8", "--duration", "60", "--set", "mission.period=1.0", "--json", "--out"]
+    arguments = ["okeefe_2013", "--cases", "16", "--duration", "400", "--set", "mission.period=1.0", "--json", "--out"]
     dispersed = ["--disperse", "css_array.noise=uniform:0:0.1", "--sensitivity", "heading_error_mean_deg"]
     assert main([*arguments, str(tmp_path / "s"), *dispersed]) == 0
     printed = capsys.readouterr().out
     result = json.loads(printed.splitlines()[-1])
-    assert result["cases"] == 8 * 4 and "draws of the case" in printed
+    assert result["cases"] == 16 * 4 and "draws of the case" in printed
     (found,) = result["sensitivity"]
-    assert [i["parameter"] for i in found["indices"]] != [] and found["base_points"] == 8
+    assert [i["parameter"] for i in found["indices"]] != [] and found["base_points"] == 16
     low, high = result["configurations"][0]["interval_95"]["heading_error_mean_deg"]
     assert low < result["configurations"][0]["heading_error_mean_deg"] < high
 

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from presence import present
 
+from css_analysis.configured_mission import configured
 from css_analysis.estimate_errors import tangent_nees
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes, windows_of
@@ -13,7 +14,7 @@ from css_common.mission import load_mission
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import BIN_DEG, SAMPLED, sample_count, step_marks
 from css_monte_carlo.chunk import fly_cases
-from css_monte_carlo.direct_flight import configured, fly_directly
+from css_monte_carlo.direct_flight import fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.percentiles import over_cases
 

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from listing import MISSIONS, anywhere, controlled_by
 
+from css_analysis.configured_mission import configured
 from css_common.mission import load_mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_estimation.sun.safe_hold import MODE_FLAT, MODE_PYRAMID, MODE_SHADOW
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
-from css_monte_carlo.direct_flight import configured, fly_directly
+from css_monte_carlo.direct_flight import fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.surroundings import BLOCK_STEPS

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from css_analysis.study_summary import rows_of
 from css_common.mission import load_mission
 from css_monte_carlo import study
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.errors import StudyError
 from css_monte_carlo.schedulers import ChunkResult, DaskScheduler, Scheduler, ThreadScheduler, run_task
 from css_monte_carlo.study import Configuration, read_study, run_study
-from css_monte_carlo.study_summary import rows_of, study_object
+from css_monte_carlo.study_summary import study_object
 
 # A coarse cycle keeps flights short; what is tested here does not depend on it.
 MISSION = load_mission("okeefe_2013").with_overrides(["mission.period=1.0", "mission.duration=120.0"])

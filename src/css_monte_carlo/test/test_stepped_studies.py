@@ -6,6 +6,7 @@ import pytest
 
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_metrics import windows_of
+from css_analysis.study_summary import configuration_objects
 from css_common.mission import MissionError, load_mission, mission_from_text
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
@@ -13,7 +14,6 @@ from css_monte_carlo.direct_flight import fly_directly
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.stepped_flight import SteppedFlight
 from css_monte_carlo.study import Configuration, run_study
-from css_monte_carlo.study_summary import configuration_objects
 
 COARSE = ("mission.period=1.0", "mission.duration=330", "mrp_control.gains.p=0.5")
 SHORT = {

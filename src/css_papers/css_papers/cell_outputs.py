@@ -5,18 +5,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_analysis.cell_outputs import NO_ERRORS, Cells
 from css_common.attitude import dcm_to_mrp
-from css_common.codec import Sample
 from css_common.mission import Mission
 from css_common.random_streams import random_key
 from css_common.vectors import mat3
-from css_environment.ephemeris import EnvironmentState
 from css_environment.mission_environment import MissionEnvironment
 from css_sim.initial_conditions import random_attitude
 
 ARRAY = "css_array"
 """Name of the node that simulates the cells in the mission."""
-_NO_ERRORS = (f"{ARRAY}.degradation=0", f"{ARRAY}.noise=0")
 _NO_ALBEDO = f"{ARRAY}.albedo.enabled=false"
 _NO_WARP = f"{ARRAY}.warp=false"
 _ORBIT_STEP_S = 10.0
@@ -46,42 +44,21 @@ class OrbitOutputs(NamedTuple):
         return self.total - self.direct
 
 
-class Cells:
-    """The cells of a mission, to be put into any place and attitude."""
-
-    def __init__(self, mission: Mission, *overrides: str) -> None:
-        mission = mission.with_overrides(overrides)
-        node = mission.node(ARRAY)
-        self._component = node.component(node.name, node.values)
-        self._epoch_ns = mission.epoch_ns
-
-    def outputs(self, time_s: float, surroundings: EnvironmentState, sigma_bn: np.ndarray) -> np.ndarray:
-        """(N,) outputs [-] at a time [s] after the epoch."""
-        stamp_ns = self._epoch_ns + round(time_s * 1e9)
-        truth = Sample(
-            stamp_ns,
-            "",
-            r_n=np.array(surroundings.r_n),
-            sigma_bn=sigma_bn,
-            sun_n=np.array(surroundings.sun_n),
-            solar_flux=surroundings.solar_flux,
-            illumination=surroundings.illumination,
-        )
-        voltages = self._component.cycle(stamp_ns, {"truth": truth})["voltages"]
-        assert isinstance(voltages, Sample)  # an output of each step
-        return voltages.voltages
-
-
 def response(mission: Mission) -> Response:
     """Response of one free cell of the mission, the Sun at 1 AU."""
-    one_cell = ("cells.normals=0,0,1", "cells.clip_normal=0,0,0", _NO_ALBEDO, *_NO_ERRORS)
+    one_cell = (
+        "cells.normals=0,0,1",
+        "cells.clip_normal=0,0,0",
+        _NO_ALBEDO,
+        *(f"{ARRAY}.{error}" for error in NO_ERRORS),
+    )
     upright = np.zeros(3)
     place = MissionEnvironment(mission.values, field=False).at(0.0)._replace(solar_flux=1.0, illumination=1.0)
     angle = np.radians(_ANGLES_DEG)
     suns = [(float(x), 0.0, float(z)) for x, z in zip(np.sin(angle), np.cos(angle), strict=True)]
 
     def curve(*overrides: str) -> np.ndarray:
-        cell = Cells(mission, *one_cell, *overrides)
+        cell = Cells(mission, ARRAY, *one_cell, *overrides)
         return np.array([cell.outputs(0.0, place._replace(sun_n=sun), upright)[0] for sun in suns])
 
     warped = curve()
@@ -96,8 +73,8 @@ def orbit_outputs(mission: Mission, sigma_bn: np.ndarray | None = None, step_s: 
     places = [environment.at(float(time)) for time in time_s]
     if sigma_bn is None:
         sigma_bn = sun_pointing(places[0].sun_n)
-    plain = (_NO_WARP, *_NO_ERRORS)
-    both, sun_only = Cells(mission, *plain), Cells(mission, *plain, _NO_ALBEDO)
+    plain = (_NO_WARP, *(f"{ARRAY}.{error}" for error in NO_ERRORS))
+    both, sun_only = Cells(mission, ARRAY, *plain), Cells(mission, ARRAY, *plain, _NO_ALBEDO)
 
     def outputs(cells: Cells) -> np.ndarray:
         return np.array([cells.outputs(float(t), p, sigma_bn) for t, p in zip(time_s, places, strict=True)])
@@ -121,7 +98,7 @@ def albedo_peaks(mission: Mission, attitudes: int, step_s: float = 60.0) -> np.n
     """
     seed = mission.values.mission.seed
     environment = MissionEnvironment(mission.values, field=False)
-    cells = Cells(mission, _NO_WARP, *_NO_ERRORS)
+    cells = Cells(mission, ARRAY, _NO_WARP, *(f"{ARRAY}.{error}" for error in NO_ERRORS))
     # a Sun in eclipse does not light the cells, but still the Earth
     places = [
         (float(t), environment.at(float(t))._replace(illumination=0.0))

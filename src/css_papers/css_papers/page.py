@@ -1,51 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A page of text, tables and figures, written twice: as HTML for a browser, as Markdown for a terminal or a forge."""
+"""A page of text, tables and figures, written twice: as HTML for a browser, as Markdown for a terminal or a forge.
 
-import html
+In HTML the figures that were drawn inside `keep_figures` can be zoomed; others are the pictures beside the page.
+"""
+
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from css_papers.rows import MISSES, Row
+from css_analysis.figure_style import kept_figure
+from css_papers.rows import Row
+from css_report.blocks import Block, Commands, Link, Listing, Page, Picture, Section, Table
+from css_report.drawn_figures import plots_of
+from css_report.html_page import anchor, html_of
 
-
-class Listing(NamedTuple):
-    """Short texts, one below the other."""
-
-    lines: Sequence[str]
-
-
-class Table(NamedTuple):
-    """Texts in columns; the first column stands left, the others right."""
-
-    heading: Sequence[str]
-    lines: Sequence[Sequence[str]]
-
-
-class Picture(NamedTuple):
-    """A file beside the page."""
-
-    file: str
-    caption: str
-
-
-class Link(NamedTuple):
-    """A way to another page of the same folder."""
-
-    page: str  # its name
-    text: str
-
-
-Block = str | Listing | Table | Picture | Link
-"""What a section holds; a text is a paragraph."""
-
-
-class Section(NamedTuple):
-    """A part of a page."""
-
-    title: str
-    blocks: Sequence[Block]
+__all__ = ["Block", "Link", "Listing", "Page", "Part", "Picture", "Section", "Table", "markdown_of", "write_page"]
 
 
 class Part(NamedTuple):
@@ -55,24 +25,6 @@ class Part(NamedTuple):
     rows: Sequence[Row]
 
 
-class Page(NamedTuple):
-    """One page."""
-
-    title: str
-    lead: str
-    sections: Sequence[Section]
-
-
-_STYLE = """
-body { font: 15px/1.5 system-ui, sans-serif; color: #1c2024; background: #fff; max-width: 62rem; margin: 2rem auto;
-       padding: 0 1rem; }
-h1 { font-size: 1.5rem; line-height: 1.25; } h2 { font-size: 1.15rem; margin-top: 2.2rem; }
-figure { margin: 1.2rem 0; } img { max-width: 100%; height: auto; } figcaption { color: #5a5a5a; }
-.wide { overflow-x: auto; } table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
-th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e3e6ea; vertical-align: top; }
-th:first-child, td:first-child { text-align: left; } th { border-bottom: 2px solid #8c8c8c; }
-td.misses { color: #b04a00; font-weight: 600; }
-"""
 FRONT = "index"
 """Name of the page that a folder opens with."""
 
@@ -83,8 +35,9 @@ def write_page(page: Page, folder: Path, name: str = FRONT) -> list[Path]:
     Raises:
         OSError: a file cannot be written.
     """
-    files = [folder / _html_name(name), folder / _markdown_name(name)]
-    for path, text in zip(files, (html_of(page), markdown_of(page)), strict=True):
+    files = [folder / f"{name}.html", folder / _markdown_name(name)]
+    sections = [Section(s.title, [b for block in s.blocks for b in _drawn(block, folder)]) for s in page.sections]
+    for path, text in zip(files, (html_of(page._replace(sections=sections)), markdown_of(page)), strict=True):
         # a page that is cut short must not look like one
         temporary = path.with_name(f".{path.name}.new")
         temporary.write_text(text, encoding="utf-8")
@@ -92,51 +45,20 @@ def write_page(page: Page, folder: Path, name: str = FRONT) -> list[Path]:
     return files
 
 
-def _html_name(name: str) -> str:
-    return f"{name}.html"
+def _drawn(block: Block, folder: Path) -> Iterator[Block]:
+    """A picture as plots, if its figure was kept and all of it has a counterpart there."""
+    figure = kept_figure(folder / block.file) if isinstance(block, Picture) else None
+    plots = None if figure is None else plots_of(figure, anchor(Path(block.file).stem))  # type: ignore[union-attr]
+    if plots is None or not isinstance(block, Picture):
+        yield block
+        return
+    yield block.caption
+    yield from plots
 
 
 def _markdown_name(name: str) -> str:
     # what forges show below the files of a folder
     return "README.md" if name == FRONT else f"{name}.md"
-
-
-def html_of(page: Page) -> str:
-    """The page as one HTML document without scripts; only its pictures are other files."""
-    e = html.escape
-    parts = [
-        "<!DOCTYPE html>",
-        '<html lang="en"><head><meta charset="utf-8">',
-        '<meta name="viewport" content="width=device-width, initial-scale=1">',
-        f"<title>{e(page.title)}</title><style>{_STYLE}</style></head><body>",
-        f"<h1>{e(page.title)}</h1>",
-        f"<p>{e(page.lead)}</p>",
-    ]
-    for section in page.sections:
-        parts.append(f"<h2>{e(section.title)}</h2>")
-        parts += [_html_block(block) for block in section.blocks]
-    return "\n".join([*parts, "</body></html>", ""])
-
-
-def _html_block(block: Block) -> str:
-    e = html.escape
-    if isinstance(block, str):
-        return f"<p>{e(block)}</p>"
-    if isinstance(block, Listing):
-        return "<ul>" + "".join(f"<li>{e(line)}</li>" for line in block.lines) + "</ul>"
-    if isinstance(block, Link):
-        return f'<p><a href="{e(_html_name(block.page))}">{e(block.text)}</a></p>'
-    if isinstance(block, Picture):
-        image = f'<img src="{e(block.file)}" alt="{e(block.caption)}">'
-        return f"<figure>{image}<figcaption>{e(block.caption)}</figcaption></figure>"
-    head = "".join(f"<th>{e(text)}</th>" for text in block.heading)
-    body = "\n".join("<tr>" + "".join(map(_html_cell, line)) + "</tr>" for line in block.lines)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
-
-
-def _html_cell(text: str) -> str:
-    kind = ' class="misses"' if text.endswith(MISSES) else ""
-    return f"<td{kind}>{html.escape(text)}</td>"
 
 
 def markdown_of(page: Page) -> str:
@@ -157,6 +79,10 @@ def _markdown_block(block: Block) -> str:
         return f"[{block.text}]({_markdown_name(block.page)})"
     if isinstance(block, Picture):
         return f"![{block.caption}]({block.file})\n\n*{block.caption}*"
+    if isinstance(block, Commands):
+        return "\n\n".join(f"{what}\n\n    {command}" for what, command in block.lines)
+    if not isinstance(block, Table):
+        raise TypeError(f"{type(block).__name__} has no form in Markdown")
     texts = [[text.replace("|", "\\|") for text in line] for line in (block.heading, *block.lines)]
     widths = [max(map(len, column)) for column in zip(*texts, strict=True)]
     rule = [("-" * max(width, 2)) + (":" if i else "-") for i, width in enumerate(widths)]

@@ -5,8 +5,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
-MISSES = "(misses)"
-"""Ends a number that is not what it must be."""
+from css_report.blocks import MISSES
 
 
 class Must(NamedTuple):

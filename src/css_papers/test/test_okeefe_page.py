@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib import image
 from noting import noted
+from page_reader import read
 from synthetic_study import case_table, percentile_table
 
 from css_analysis.flight_metrics import Windows
@@ -136,9 +137,11 @@ def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
     assert maps["wavg_warped"]["mean_deg"] == pytest.approx(23.87, abs=0.005)
     pages = {name: (folder / name).read_text(encoding="utf-8") for name in ("index.html", "calibration.html")}
     for page in pages.values():
-        for file in {part.split('"')[0] for part in page.split('src="')[1:]}:
-            pixels = image.imread(folder / file)
-            assert min(pixels.shape[:2]) > 300 and pixels[..., :3].std() > 0.02
+        found = read(page)
+        assert found.plots and [link for link in found.outside if link.endswith(".png")] == []
+    for file in folder.glob("*.png"):
+        pixels = image.imread(file)
+        assert min(pixels.shape[:2]) > 300 and pixels[..., :3].std() > 0.02
     for figure in ("1b", "2", "3", "4", "5a", "5b", "6", "7a", "7b", "8"):
         assert f"Figure {figure}." in pages["index.html"]
     assert (folder / "README.md").is_file() and (folder / "calibration.md").is_file()

@@ -2,12 +2,13 @@
 """Rows judge numbers as they should, pages say the same in HTML and in Markdown."""
 
 import json
-from html.parser import HTMLParser
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from page_reader import read
 
+from css_analysis.figure_style import keep_figures, new_figure, save, style
 from css_papers.errors import ReproductionError
 from css_papers.page import Link, Listing, Page, Picture, Section, Table, write_page
 from css_papers.paper_names import paper_names
@@ -20,29 +21,6 @@ ROWS = [
     row("rate", "deg/s", None, None, Must(0.1, 0.2), relation="noise level"),
     row("time", "min", 3.0, 12.345),
 ]
-
-
-class Reader(HTMLParser):
-    """Texts of cells, and files that a document points at."""
-
-    def __init__(self):
-        super().__init__()
-        self.cells, self.files, self.open = [], [], []
-
-    def handle_starttag(self, tag, attrs):
-        attributes = dict(attrs)
-        self.files += [attributes[name] for name in ("src", "href") if name in attributes]
-        if tag not in ("meta", "img"):
-            self.open.append(tag)
-        if tag in ("td", "th"):
-            self.cells.append("")
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and self.open[-1] in ("td", "th"):
-            self.cells[-1] += data
 
 
 @given(st.floats(allow_nan=True), st.none() | st.floats(-1e3, 1e3), st.none() | st.floats(-1e3, 1e3))
@@ -110,10 +88,8 @@ def test_both_forms_of_a_page_say_the_same(tmp_path):
     files = write_page(Page("Title", "Lead", [Section("Part", blocks)]), tmp_path)
     assert [file.name for file in files] == ["index.html", "README.md"]
     assert sorted(file.name for file in tmp_path.iterdir()) == ["README.md", "index.html"]
-    reader = Reader()
-    reader.feed(files[0].read_text(encoding="utf-8"))
-    assert reader.open == []
-    assert reader.files == ["a.png", "more.html"]
+    reader = read(files[0].read_text(encoding="utf-8"))
+    assert reader.outside == ["a.png", "more.html"]
     assert reader.cells == [*heading, *(cell for line in lines for cell in line)]
     markdown = files[1].read_text(encoding="utf-8")
     drawn = [line for line in markdown.splitlines() if line.startswith("| ")]
@@ -121,6 +97,22 @@ def test_both_forms_of_a_page_say_the_same(tmp_path):
     assert table[0] == heading and table[2:] == lines
     assert len({len(line) for line in drawn}) == 1
     assert "![A picture](a.png)" in markdown and "[More](more.md)" in markdown and "- error: less" in markdown
+
+
+def test_figures_that_are_kept_can_be_zoomed(tmp_path):
+    with style(), keep_figures():
+        figure = new_figure(4.0, 3.0)
+        axes = figure.subplots()
+        axes.plot([0.0, 1.0, 2.0], [3.0, 5.0, 4.0], label="mean")
+        axes.set_xlabel("time [s]")
+        axes.set_ylabel("angle [deg]")
+        save(figure, tmp_path / "figure_6.png")
+        blocks = [Picture("figure_6.png", "Figure 6. Errors."), Picture("other.png", "No figure.")]
+        html, markdown = write_page(Page("Title", "Lead", [Section("Part", blocks)]), tmp_path)
+    page = read(html.read_text(encoding="utf-8"))
+    assert page.trace("figure-6-1", "mean")["y"].tolist() == [3.0, 5.0, 4.0]
+    assert page.outside == ["other.png"] and "Figure 6. Errors." in page.texts
+    assert "![Figure 6. Errors.](figure_6.png)" in markdown.read_text(encoding="utf-8")
 
 
 def test_papers_are_the_packages_of_the_folder():

@@ -17,14 +17,13 @@ from css_common.sections import (
     INERTIA,
     ORBIT_SOURCE,
     PERIOD,
-    ROD_AXES,
-    ROD_MAX_DIPOLE,
     RODS_FITTED,
     WHEEL_INERTIA,
     WHEEL_MAX_SPEED,
     WHEEL_MAX_TORQUE,
     WHEELS_FITTED,
     of_each_wheel,
+    rod_max_dipoles,
     wheel_axes,
 )
 from css_common.vectors import Vec3
@@ -147,12 +146,11 @@ def _torque_findings(values: Values) -> Iterator[Finding]:
     period, smallest = values[PERIOD], float(np.linalg.eigvalsh(values[INERTIA])[0])
     torques = {"disturbances.torque": float(np.linalg.norm(values[TORQUE]))}
     if values[WHEELS_FITTED]:
-        axes = wheel_axes(values)
-        together = float(np.linalg.norm(axes, 2)) * math.sqrt(len(axes))  # no torques of +-1 along them sum up to more
-        torques["wheels.max_torque"] = values[WHEEL_MAX_TORQUE] * together
+        most = wheel_axes(values) * of_each_wheel(values, WHEEL_MAX_TORQUE)[:, None]
+        # no sum of them with any signs is larger
+        torques["wheels.max_torque"] = float(np.linalg.norm(most, 2)) * math.sqrt(len(most))
     if values[RODS_FITTED]:
-        dipole = values[ROD_MAX_DIPOLE] * math.sqrt(len(values[ROD_AXES]))
-        torques["rods.max_dipole"] = dipole * _FIELD_AT_GROUND
+        torques["rods.max_dipole"] = float(np.sum(rod_max_dipoles(values))) * _FIELD_AT_GROUND
     for key, torque in torques.items():
         faster = torque / smallest * period
         if faster > FASTEST or 0.5 * faster * period > _FARTHEST_TURN:

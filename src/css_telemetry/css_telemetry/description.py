@@ -55,6 +55,7 @@ class CellForm(NamedTuple):
     dark_level: float | None = None
     lookup: tuple[tuple[float, ...], tuple[float, ...]] | None = None  # readings, growing, and outputs
     thermal: Thermal | None = None
+    field_of_view_deg: float | None = None  # full cone; None: that of all cells
 
 
 class VectorForm(NamedTuple):
@@ -150,6 +151,11 @@ class Description(NamedTuple):
     def names_roles(self) -> bool:
         """Whether it says which columns are aiding and truth; else the header tells."""
         return self.aiding is not None or self.truth is not None
+
+    @property
+    def views_known(self) -> bool:
+        """Whether it says how far each cell sees."""
+        return self.field_of_view_deg is not None or all(cell.field_of_view_deg is not None for cell in self.cells)
 
     @property
     def scaled(self) -> bool:

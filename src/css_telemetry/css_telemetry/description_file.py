@@ -71,10 +71,8 @@ def description_of(text: str) -> Description:
         raise ValueError("expected the key cells with a normal [x, y, z] for each column name")
     keys = Entry(document).children(_KEYS)
     optional: dict[str, Any] = {}
-    cells, views = _cells(keys)
-    view = keys.get("field_of_view_deg")
-    if view is not None or views:
-        optional["field_of_view_deg"] = _view(views, view)
+    cells = _cells(keys)
+    optional["field_of_view_deg"] = _view(keys.get("field_of_view_deg"))
     if (clip := keys.get("clip_normal")) is not None:
         optional["clip_normal_b"] = clip.unit_vector()
     if (table := keys.get("table")) is not None:
@@ -98,26 +96,23 @@ def _named(name: str) -> str:
     return name
 
 
-def _cells(keys: Children) -> tuple[tuple[CellForm, ...], dict[str, Entry]]:
-    """The cells, and their fields of view where they are told."""
+def _cells(keys: Children) -> tuple[CellForm, ...]:
     given = keys["cells"].value
     scales = _for_each_cell(keys, "full_scale", given)
     darks = _for_each_cell(keys, "dark_level", given)
     unit = _unit(keys.get("unit"))
-    cells, views = [], {}
+    cells = []
     for name, value in given.items():
         _named(name)
         entry = Entry(value, f"cell {name}")
         if isinstance(value, dict):
             own = entry.children(_CELL_KEYS)
             cells.append(_cell(name, own, unit, scales.get(name), darks.get(name)))
-            if "field_of_view_deg" in own:
-                views[name] = own["field_of_view_deg"]
         else:
             cells.append(
                 CellForm(name, name, entry.unit_vector(), unit, _positive(scales.get(name)), _number(darks.get(name)))
             )
-    return tuple(cells), views
+    return tuple(cells)
 
 
 def _cell(name: str, own: Children, unit: str, scale: Entry | None, dark: Entry | None) -> CellForm:
@@ -133,6 +128,7 @@ def _cell(name: str, own: Children, unit: str, scale: Entry | None, dark: Entry 
         _number(own.get("dark_level") or dark),
         None if lookup is None else _lookup(lookup),
         None if thermal is None else _thermal(thermal),
+        _view(own.get("field_of_view_deg")),
     )
 
 
@@ -179,19 +175,14 @@ def _thermal(entry: Entry) -> Thermal:
     return Thermal(keys["column"].word(), keys["coefficient"].number(), keys["reference"].number())
 
 
-def _view(views: dict[str, Entry], common: Entry | None) -> float:
-    """The full cone of view, which a mission has one of for all cells."""
-    entries = [*views.values(), *([common] if common is not None else [])]
-    angles = [entry.number() for entry in entries]
-    for entry, angle in zip(entries, angles, strict=True):
-        if not 1.0 <= angle <= 180.0:
-            raise ValueError(f"{entry.name}: {entry.value} given, expected 1 to 180")
-    if max(angles) - min(angles) > 1e-9:
-        raise ValueError(
-            f"{entries[0].name}: fields of view of {min(angles):g} and {max(angles):g} deg given, expected one for all "
-            "cells"
-        )
-    return angles[0]
+def _view(entry: Entry | None) -> float | None:
+    """A full cone of view."""
+    if entry is None:
+        return None
+    angle = entry.number()
+    if not 1.0 <= angle <= 180.0:
+        raise ValueError(f"{entry.name}: {entry.value} given, expected 1 to 180")
+    return angle
 
 
 def _table(entry: Entry) -> TableForm:

@@ -13,8 +13,11 @@ from css_telemetry.places import Place
 WORST_M = 20e3
 """Distance [m] of a position from the fitted orbit beyond which it is none: 0.15 deg, 3 s of a low orbit."""
 
-LONGEST_S = 3 * 86_400.0
+LONGEST_S = 7 * 86_400.0
 """Span [s] over which one set of elements is tried: later, drag and the Moon have moved the spacecraft."""
+
+_FIRST_SPAN_S = 3_000.0  # half of an orbit, from which on a fit is carried to longer spans
+_SPANS_GROW = 8.0
 
 _MOST_POINTS = 300
 _BEGINNING_S = 120.0  # of positions by which a first velocity is found
@@ -50,8 +53,6 @@ def fit_orbit(place: Place, stamps_ns: np.ndarray) -> OrbitFit:
     Raises:
         ValueError: they follow no orbit, or there are too few; says so.
     """
-    from scipy.optimize import least_squares
-
     known = np.flatnonzero(np.isfinite(place.r_n).all(axis=1))
     if len(known) < 3:
         raise ValueError(f"{len(known)} positions are known, expected at least 3")
@@ -59,27 +60,42 @@ def fit_orbit(place: Place, stamps_ns: np.ndarray) -> OrbitFit:
     if elapsed[known[-1]] - elapsed[0] > LONGEST_S:
         span = (elapsed[known[-1]] - elapsed[0]) / 86_400.0
         raise ValueError(f"they span {span:.1f} days, one set of elements holds for {LONGEST_S / 86_400.0:g}")
-    used = known[np.unique(np.linspace(0, len(known) - 1, min(len(known), _MOST_POINTS)).astype(int))]
-    time, r_n = elapsed[used], place.r_n[used]
-    start = _first_state(place, elapsed, known)
-    scale = np.array([1e3] * 3 + [1.0] * 3)
-
-    def misses(x: np.ndarray) -> np.ndarray:
-        state = start + scale * x
-        track, _ = J2Track(state[:3], state[3:]).states(time)
-        miss = (track - r_n) / 1e3
-        return np.where(np.isfinite(miss), np.clip(miss, -1e6, 1e6), 1e6).ravel()
-
-    found = least_squares(misses, np.zeros(6), method="trf", x_scale="jac", max_nfev=40)
-    away = 1e3 * np.linalg.norm(found.fun.reshape(-1, 3), axis=1)
+    state = _first_state(place, elapsed, known)
+    span, longest = elapsed[known[0]] + _FIRST_SPAN_S, float(elapsed[known[-1]])
+    while span < longest:
+        near = known[elapsed[known] <= span]
+        if len(near) >= 3:
+            state, _ = _improved(state, elapsed, place.r_n, near)
+        span *= _SPANS_GROW
+    state, misses = _improved(state, elapsed, place.r_n, known)
+    away = np.linalg.norm(misses, axis=1)
     rms, worst = float(np.sqrt(np.mean(away**2))), float(np.max(away))
     if not worst <= WORST_M:
         raise ValueError(
             f"they are up to {worst / 1e3:.3g} km from the nearest orbit, expected at most {WORST_M / 1e3:g} km: check "
             "frame, unit and times"
         )
-    state = start + scale * found.x
     return OrbitFit(elements_of(state[:3], state[3:]), rms, worst)
+
+
+def _improved(
+    start: np.ndarray, elapsed: np.ndarray, r_n: np.ndarray, rows: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The state (6,) at time zero that fits the positions of some rows best, and how far (K, 3) [m] it misses them."""
+    from scipy.optimize import least_squares
+
+    used = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_POINTS)).astype(int))]
+    time, positions = elapsed[used], r_n[used]
+    scale = np.array([1e3] * 3 + [1.0] * 3)
+
+    def misses(x: np.ndarray) -> np.ndarray:
+        state = start + scale * x
+        track, _ = J2Track(state[:3], state[3:]).states(time)
+        miss = (track - positions) / 1e3
+        return np.where(np.isfinite(miss), np.clip(miss, -1e6, 1e6), 1e6).ravel()
+
+    found = least_squares(misses, np.zeros(6), method="trf", x_scale="jac", max_nfev=40)
+    return start + scale * found.x, 1e3 * found.fun.reshape(-1, 3)
 
 
 def _first_state(place: Place, elapsed: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writes telemetry into a recording that replays like one of Sunpoint's own.
 
-Topics: `css/voltages`; `gyro/imu`, `mag/field`, `wheels/state` and `temperature/NAME` where the table has them; `truth`
-where it has the Sun vector or the attitude. The mission inside holds what the description tells of the spacecraft and
-its orbit, and nothing else.
+Topics: `css/voltages`; `gyro/imu`, `mag/field`, `wheels/state`, `css/temperature` (further ones on `temperature/NAME`)
+where the table has them; `truth` where it has the Sun vector or the attitude. The mission inside holds what the
+description tells of the spacecraft and its orbit, and nothing else.
 """
 
 import json
@@ -34,6 +34,7 @@ VOLTAGES = Topic("/css/voltages", "css_msgs/msg/CssVoltages")
 IMU = Topic("/gyro/imu", "sensor_msgs/msg/Imu")
 FIELD = Topic("/mag/field", "sensor_msgs/msg/MagneticField")
 WHEELS = Topic("/wheels/state", "css_msgs/msg/WheelState")
+TEMPERATURE = "/css/temperature"
 TRUTH = Topic("/truth", "css_msgs/msg/SpacecraftState")
 SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.001, 60.0
 _LARGEST_GAP_S = 60.0
@@ -67,7 +68,7 @@ def write_recording(
     """
     topics = [TRUTH] * (states is not None) + [VOLTAGES] + [IMU] * (telemetry.rate is not None)
     topics += [FIELD] * (telemetry.field is not None) + [WHEELS] * (telemetry.wheels is not None)
-    topics += [_temperature_topic(name) for name in telemetry.temperatures]
+    topics += _temperature_topics(telemetry).values()
     origin = {"file": source.name, "sha256": telemetry.sha256, "truth": list(states.known) if states else []}
     metadata = {
         "mission": mission_text(telemetry, orbit, source.stem, period_s, largest_step_s),
@@ -110,6 +111,9 @@ def mission_text(
         "io.inertial_frame": INERTIAL_FRAME,
         "io.largest_gap": max(_LARGEST_GAP_S, 2.0 * largest_step_s),
     }
+    if any(cell.field_of_view_deg is not None for cell in description.cells):
+        usual = description.field_of_view_deg or USUAL_VIEW_DEG
+        entries["cells.fields_of_view_deg"] = [cell.field_of_view_deg or usual for cell in description.cells]
     if description.inertia:
         entries["spacecraft.inertia"] = list(description.inertia)
     wheels = description.aiding.wheels if description.aiding is not None else None
@@ -120,8 +124,15 @@ def mission_text(
     return dump_sections({"/**": entries})
 
 
-def _temperature_topic(name: str) -> Topic:
-    return Topic(f"/temperature/{_ros_name(name)}", "sensor_msgs/msg/Temperature")
+def _temperature_topics(telemetry: Telemetry) -> dict[str, Topic]:
+    """Topic of each column: the first is that of the cells."""
+    topics: dict[str, Topic] = {}
+    for number, name in enumerate(telemetry.temperatures):
+        topic = f"/temperature/{_ros_name(name)}" if number else TEMPERATURE
+        if any(known.name == topic for known in topics.values()):
+            topic = f"{topic}_{number}"
+        topics[name] = Topic(topic, "sensor_msgs/msg/Temperature")
+    return topics
 
 
 def _ros_name(name: str) -> str:
@@ -157,11 +168,12 @@ def _measured(telemetry: Telemetry, row: int, stamp_ns: int, blind: bool) -> Ite
         codec = codec_of(WheelState)
         speed = telemetry.wheels[row]
         yield WHEELS, codec.encode(codec.sample(stamp_ns, BODY_FRAME, speed=speed, torque=np.zeros(len(speed))))
-    for name, values in telemetry.temperatures.items():
+    for name, topic in _temperature_topics(telemetry).items() if telemetry.temperatures else ():
+        values = telemetry.temperatures[name]
         if np.isfinite(values[row]):
             codec = codec_of(Temperature)
             yield (
-                _temperature_topic(name),
+                topic,
                 codec.encode(codec.sample(stamp_ns, BODY_FRAME, temperature=float(values[row]))),
             )
 

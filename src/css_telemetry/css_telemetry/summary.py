@@ -40,7 +40,7 @@ def summary_lines(report: ImportReport) -> Iterator[str]:
         yield f"gaps in time: {report.gaps}, the longest {report.longest_gap_s:g} s"
     if telemetry.read_as:
         yield f"read as: {', '.join(telemetry.read_as)}"
-    if telemetry.description.field_of_view_deg is None:
+    if not telemetry.description.views_known:
         yield f"field of view of the cells: not told, taken for {USUAL_VIEW_DEG:g} deg (field_of_view_deg tells it)"
     yield from _truth_lines(report)
     yield from report.orbit_notes

@@ -71,7 +71,7 @@ def _excel(path: Path, content: bytes, sheet: str) -> tuple["pd.DataFrame", str]
             if name not in book.sheet_names:
                 known = ", ".join(map(str, book.sheet_names))
                 raise BagError(f"{path}: no sheet {name}, expected one of {known}")
-            return book.parse(name), name
+            return pd.read_excel(book, sheet_name=name), name
     except (zipfile.BadZipFile, KeyError, ValueError, OSError) as error:
         raise BagError(f"{path}: cannot be read as Excel: {' '.join(str(error).split())}") from error
 

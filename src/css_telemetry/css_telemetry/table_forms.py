@@ -22,7 +22,7 @@ YAML:
       CSS_1: [0.7071, 0.0, 0.7071]     # column name: outward normal in the body frame
       CSS_2: {column: A2, normal: [0, 0.7, 0.7], full_scale: 2900, dark_level: 100,
               temperature: {column: T2, coefficient: 0.001, reference: 25}}
-      CSS_3: {normal: [0, 0, 1], lookup: [[100, 0.0], [1500, 0.48], [3000, 1.0]]}
+      CSS_3: {normal: [0, 0, 1], lookup: [[100, 0.0], [1500, 0.48], [3000, 1.0]], field_of_view_deg: 90}
     field_of_view_deg: 120.0           # full cone of view of a cell
     clip_normal: [0.0, 0.0, 1.0]       # body plane that hides the other half space from each cell
     full_scale: 3000.0                 # what the Sun, met head-on, adds to the dark level; or one for each cell

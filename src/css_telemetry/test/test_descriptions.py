@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 from presence import present
 from scipy.spatial.transform import Rotation
 
+from css_common.mission import mission_from_text
 from css_recording.errors import BagError
 from css_telemetry.description import VectorForm
 from css_telemetry.description_file import description_of, read_description
 from css_telemetry.proposal import proposed
+from css_telemetry.recording import mission_text
 from css_telemetry.telemetry import read_telemetry
 
 CELL = "cells: {c: [1, 0, 0]}\n"
@@ -73,6 +75,15 @@ unit: counts
         ("outside of the lookup table", 1, 4)
     ]
     assert telemetry.account.missing["cell outputs without a temperature"][:2] == (1, 4)
+
+
+def test_fields_of_view_of_single_cells_reach_the_mission(tmp_path):
+    text = "cells: {a: {normal: [1, 0, 0], field_of_view_deg: 90}, b: [0, 1, 0]}\nfield_of_view_deg: 140\n"
+    telemetry = read(tmp_path, "time,a,b", f"{BEGIN},1,0.5", text=text)
+    mission = mission_from_text(mission_text(telemetry, {}, "views", 1.0, 1.0), "views")
+    assert mission.values.cells.fields_of_view_deg.tolist() == [90.0, 140.0]
+    assert telemetry.description.views_known
+    assert not description_of("cells: {a: {normal: [1, 0, 0], field_of_view_deg: 90}, b: [0, 1, 0]}\n").views_known
 
 
 def test_stated_sentinels_are_those_and_no_others(tmp_path):
@@ -187,6 +198,7 @@ def test_long_form_with_repetitions(tmp_path):
         ("aiding: {wheels: {columns: [a], unit: rpm}}", "aiding.wheels.axes: missing, expected a list"),
         ("cells: {c: {normal: [1, 0, 0], lookup: [[1, 0], [1, 1]]}}", "whose readings grow"),
         ("cells: {c: {normal: [1, 0, 0], colour: red}}", "cell c: unknown key colour"),
+        ("cells: {c: {normal: [1, 0, 0], field_of_view_deg: 200}}", "field_of_view_deg: 200 given, expected 1 to 180"),
         ("cells: {c: {full_scale: 3}}", "cell c.normal: missing, expected a unit vector"),
         ("table: {separator: x}", "table.separator: 'x' given"),
         ("table: {encoding: klingon}", "table.encoding: 'klingon' given, expected an encoding"),

@@ -14,6 +14,7 @@ from pathlib import Path
 
 from css_bringup.options import guarded
 from css_common.command import CommandParser, command_parser, implementation
+from css_report.after_run import add_page_option
 
 _EXAMPLES = (
     "bags/FLIGHT",
@@ -47,6 +48,7 @@ def _parser() -> CommandParser:
     parser.add_argument("--overwrite", action="store_true", help="replace a recording that is there")
     parser.add_argument("--figures", type=Path, metavar="DIR", help="write figures of the comparison as PNG")
     parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
+    add_page_option(parser)
     return parser
 
 

@@ -5,6 +5,7 @@ import argparse
 
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_log import read_flight
+from css_bringup.flight_pages import write_demo_page
 from css_bringup.flight_result import default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
@@ -51,12 +52,14 @@ def run(arguments: argparse.Namespace) -> int:
     print_figures(log, folder)
     print_figures(replayed.log, folder / "replay")
     runs = [*flown, *(run for run in replayed.runs if not run["flown"])]
+    page = write_demo_page(log, runs, bag, replayed) if arguments.report else None
     missed = unmet(flight, flown)
     for line in missed:
         complain("criterion missed:", line)
     print_incidents(flight)
     if arguments.json:
-        print_json(flight_object(flight, runs))
+        print_json(flight_object(flight, runs) | {"page": None if page is None else str(page)})
     for line in replayed.shortcomings:
         complain("not as it should be:", line)
-    return FAILED if missed or flight.notes or replayed.shortcomings else 0
+    unwritten = arguments.report and page is None
+    return FAILED if missed or flight.notes or replayed.shortcomings or unwritten else 0

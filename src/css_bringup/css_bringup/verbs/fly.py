@@ -6,10 +6,11 @@ import os
 from collections.abc import Mapping
 
 from css_analysis.estimator_runs import Run, estimator_runs
+from css_analysis.faults_flown import NOTHING_FLOWN, faults_flown
 from css_analysis.flight_log import read_flight
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
-from css_bringup.faults_flown import NOTHING_FLOWN, faults_flown
+from css_bringup.flight_pages import write_flight_page
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
 from css_bringup.mission_asked_for import mission_of
@@ -47,15 +48,20 @@ def run(arguments: argparse.Namespace) -> int:
             stand_ins=components,
         )
     result.domain = domain
-    return conclude(mission, result, as_json=arguments.json)
+    return conclude(mission, result, as_json=arguments.json, with_page=arguments.report)
 
 
 def conclude(
-    mission: Mission, result: FlightResult, *, as_json: bool, further: Mapping[str, object] | None = None
+    mission: Mission,
+    result: FlightResult,
+    *,
+    as_json: bool,
+    further: Mapping[str, object] | None = None,
+    with_page: bool = False,
 ) -> int:
-    """Prints a flight's result and turns it into an exit code; `further` goes into its JSON object."""
+    """Prints a flight's result, writes its page and turns it into an exit code; `further` goes into its JSON object."""
     runs: list[Run] = []
-    failed = NOTHING_FLOWN
+    failed, log = NOTHING_FLOWN, None
     if result.bag is not None and result.steps > 0:
         try:
             log = read_flight(result.bag)
@@ -72,21 +78,24 @@ def conclude(
         complain("warning:", line)
     result.warnings += failed.warnings
     spinning = None if result.bag is None or result.failure else read_spinning(result.bag)
-    for line in spin_lines(spinning) if spinning is not None else ():
+    told = [] if spinning is None else spin_lines(spinning)
+    for line in told:
         console.print(line, soft_wrap=True)
     flown = not (result.failure or result.interrupted)
     missed = unmet(result, runs) if flown and result.bag is not None else []
     for line in missed:
         complain("criterion missed:", line)
+    page = None if log is None or not with_page else write_flight_page(log, runs, failed, result, told)
     print_incidents(result)
     if as_json:
         print_json(
             flight_object(result, runs)
-            | {"faults": failed.faults, "detections": failed.objects()}
+            | {"faults": failed.faults, "detections": failed.objects(), "page": None if page is None else str(page)}
             | ({} if spinning is None else {"spin": spin_object(spinning)})
             | dict(further or {})
         )
     if result.interrupted:
         errors.print("interrupted; the recording up to here is complete")
         return INTERRUPTED
-    return FAILED if result.failure or result.notes or missed else 0
+    unwritten = with_page and log is not None and page is None
+    return FAILED if result.failure or result.notes or missed or unwritten else 0

@@ -5,6 +5,7 @@ import argparse
 
 from css_analysis.flight_log import FlightLog
 from css_analysis.flight_summary import isolated_lines, summary_table
+from css_bringup.flight_pages import write_replay_page
 from css_bringup.options import complain, console
 from css_bringup.replay_bag import ReplayResult, default_replay, mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
@@ -40,11 +41,12 @@ def run(arguments: argparse.Namespace) -> int:
         from css_bringup.figure_files import print_figures  # matplotlib takes a second to load
 
         print_figures(result.log, arguments.figures)
+    page = write_replay_page(result) if arguments.report else None
     if arguments.json:
-        print_json(result.result_object())
+        print_json(result.result_object() | {"page": None if page is None else str(page)})
     for line in result.shortcomings:
         complain("not as it should be:", line)
-    return FAILED if result.shortcomings else 0
+    return FAILED if result.shortcomings or (arguments.report and page is None) else 0
 
 
 def _remapping(text: str) -> tuple[str, str]:

@@ -77,8 +77,8 @@ def budget_of(
     predicted = propagation.propagate(mission, nominal, tell_predicted)
     active = [source for source in heard_sources(mission) if is_active(mission, source)]
     parts = [
-        _part("heading", predicted.heading, predicted.bound, flown, measured.split(flown, active, "heading")),
-        _part("pointing", predicted.pointing, math.nan, flown, measured.split(flown, active, "pointing")),
+        _part("heading", predicted.heading, predicted, flown, measured.split(flown, active, "heading")),
+        _part("pointing", predicted.pointing, predicted, flown, measured.split(flown, active, "pointing")),
     ]
     return Budget(
         mission.name,
@@ -101,7 +101,11 @@ def _check(mission: Mission) -> None:
 
 
 def _part(
-    name: str, predicted: dict[str, float] | None, bound: float, flown: dict[str, Errors], split: dict[str, Split]
+    name: str,
+    predicted: dict[str, float] | None,
+    whole_of: Propagated,
+    flown: dict[str, Errors],
+    split: dict[str, Split],
 ) -> Part:
     squares = predicted or {}
     whole = flown[ALL]
@@ -109,7 +113,11 @@ def _part(
     samples = whole.samples if name == "heading" else whole.pointing_samples
     order = [source.name for source in SOURCES if source.name in split]
     order += [source for source in (LAYOUT, FILTER) if source in split]
-    rows = [_row(source, squares.get(source, math.nan), split[source], total.value) for source in order]
+    seconds = whole_of.second_order if name == "heading" else {}
+    rows = [
+        _row(source, squares.get(source, math.nan), seconds.get(source, 0.0), split[source], total.value)
+        for source in order
+    ]
     alone = [row.alone.value for row in rows if math.isfinite(row.alone.value)]
     summed = math.sqrt(max(0.0, sum(math.copysign(value**2, value) for value in alone)))
     return Part(
@@ -119,7 +127,7 @@ def _part(
         Estimate(summed, math.nan, math.nan),
         _degrees(total),
         _degrees(measured.bound(samples)),
-        _DEG * bound,
+        _DEG * whole_of.bound if name == "heading" else math.nan,
     )
 
 
@@ -127,14 +135,21 @@ def _degrees(estimate: Estimate) -> Estimate:
     return Estimate(*(_DEG * value for value in estimate))
 
 
-def _row(source: str, square: float, split: Split, total: float) -> Row:
+def _row(source: str, square: float, second: float, split: Split, total: float) -> Row:
     predicted = math.sqrt(square) if square >= 0.0 else math.nan
-    remark = remark_on(predicted, split, total)
+    remark = remark_on(predicted, split, total, math.sqrt(second) if second >= 0.0 else 0.0)
     return Row(source, _DEG * predicted, _degrees(split.alone), _degrees(split.left_out), remark)
 
 
-def remark_on(predicted: float, split: Split, total: float) -> str:
-    """Words where propagation and Monte Carlo disagree, or the Monte Carlo with itself; empty where they agree."""
+def remark_on(predicted: float, split: Split, total: float, second_order: float = 0.0) -> str:
+    """Words where propagation and Monte Carlo disagree, or the Monte Carlo with itself; empty where they agree.
+
+    Args:
+        predicted: root mean square by propagation.
+        split: by the Monte Carlo.
+        total: that of all sources together.
+        second_order: what propagation leaves out because it is not linear.
+    """
     alone, left_out = split
     least = math.sqrt(_MATTERS) * total
     words = []
@@ -143,9 +158,11 @@ def remark_on(predicted: float, split: Split, total: float) -> str:
             words.append("linear propagation says more than flights show")
         else:
             words.append("flights show more than linear propagation says: not linear, or it moves the flight itself")
+            if second_order > 0.5 * predicted:
+                words.append(f"of second order it makes {_DEG * second_order:.2f} deg")
     if math.isfinite(left_out.value) and max(abs(left_out.value), abs(alone.value)) > least:
         if left_out.value < 0.0 and left_out.high < 0.0:
-            words.append("the flight is better with it: it makes up for another")
+            words.append("beside the others errors are smaller with it")
         elif left_out.low > _ALIKE * max(alone.high, 0.0):
             words.append("costs more beside the others than alone")
         elif alone.low > _ALIKE * max(left_out.high, 0.0):

@@ -8,6 +8,7 @@ import numpy as np
 
 from css_common.mission import Mission, MissionError
 from css_monte_carlo.mission_parts import Parts, parts_of
+from css_sensors.cells import CELLS, NORMALS
 
 LAYOUT = "layout"
 """What the place and view of the cells cost: against cells that look everywhere."""
@@ -43,8 +44,9 @@ SOURCES = (
             "fixed_degradation": 0.0,
             "degradation": 0.0,
             "warp": False,
+            "thermal.coefficient": 0.0,
         },
-        "scale, offset, response and losses of the cells",
+        "scale, offset, response, losses and warmth of the cells",
     ),
     Source("misalignment", "array", {"misalignment_deg": 0.0}, "tilt of the cells"),
     Source("quantisation", "array", {"bits": 0, "dropout": 0.0}, "steps and threshold of the cells' converter"),
@@ -115,6 +117,8 @@ def seeing_everywhere(mission: Mission) -> Mission | None:
         f"cells.field_of_view_deg={_DENSE_VIEW_DEG}",
         "cells.clip_normal=0,0,0",
     ]
+    for_each = [p for p in CELLS if p.is_array and p.length is None and p is not NORMALS]
+    overrides += [f"{p.name}=" for p in for_each if len(mission.values[p])]
     if np.any(array.values.collar.axis):
         overrides += [f"{array.name}.collar.axis=0,0,0", f"{array.name}.collar.cells="]
     if mission.values.graph.estimator in ("flat", "pyramid_switch"):

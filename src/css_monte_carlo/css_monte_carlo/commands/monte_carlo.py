@@ -14,6 +14,7 @@ from pathlib import Path
 from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
 from css_monte_carlo.errors import StudyError
+from css_report.after_run import add_page_option
 
 _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",
@@ -112,6 +113,7 @@ def _parser() -> CommandParser:
     add("--threads", type=int, metavar="N", help="flights at a time (default: one per processor)")
     add("--scheduler", metavar="ADDRESS", help="dask scheduler to run on; local starts one on this machine")
     add("--json", action="store_true", help="print the result as one JSON object on the last line")
+    add_page_option(parser)
     return parser
 
 

@@ -10,8 +10,9 @@ from pathlib import Path
 
 from rich.console import Console
 
+from css_analysis.study_criteria import judge, refuse_unknown_criteria
 from css_common import places
-from css_common.command import INTERRUPTED
+from css_common.command import FAILED, INTERRUPTED
 from css_common.dispersions import SECTION
 from css_common.mission import Mission, load_mission
 from css_common.sampling import design_size
@@ -21,10 +22,12 @@ from css_monte_carlo.progress import CaseProgress, progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.sensitivity import sensitivities
 from css_monte_carlo.study import Configuration, Study, run_study
-from css_monte_carlo.study_criteria import judge, refuse_unknown_criteria
 from css_monte_carlo.study_summary import study_object
 from css_monte_carlo.study_tables import print_sensitivity, print_study, print_worst
 from css_monte_carlo.worst_case import Worst, find_worst
+from css_report.after_run import write_page_after
+from css_report.places import page_of
+from css_report.study_page import study_page
 
 
 def run(options: argparse.Namespace) -> int:
@@ -74,11 +77,16 @@ def run(options: argparse.Namespace) -> int:
         print(line)
     if judged:
         result["criteria"] = [configuration.as_object() for configuration in judged]
+    page = None
+    if options.report:
+        page = write_page_after("monte-carlo", lambda: study_page(study), page_of(study.folder))
+    result["page"] = None if page is None else str(page)
     if options.json:
         print(json.dumps(result, allow_nan=False))
     if any(one.interrupted for one in worst):
         return INTERRUPTED
-    return 0 if all(configuration.passed for configuration in judged) else 1
+    unwritten = options.report and page is None
+    return FAILED if unwritten or not all(configuration.passed for configuration in judged) else 0
 
 
 def _sampled(mission: Mission, options: argparse.Namespace) -> tuple[Mission, int]:

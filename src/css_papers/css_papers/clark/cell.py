@@ -5,11 +5,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_analysis.cell_outputs import Cells
 from css_common.attitude import rotation_vector_to_mrp
 from css_common.mission import Mission
 from css_common.vectors import vector_of
 from css_environment.mission_environment import MissionEnvironment
-from css_papers.cell_outputs import ARRAY, Cells
+from css_papers.cell_outputs import ARRAY
 from css_papers.rows import Row, row
 
 _QUIET = (f"{ARRAY}.noise=0", f"{ARRAY}.albedo.enabled=false")
@@ -32,7 +33,7 @@ class Cell:
     """The first flat cell of a mission in the light of the Sun at 1 AU alone."""
 
     def __init__(self, mission: Mission) -> None:
-        self._cells = Cells(mission, *_QUIET)
+        self._cells = Cells(mission, ARRAY, *_QUIET)
         self._normal = mission.values.cells.normals[0]
         around = MissionEnvironment(mission.values, field=False).at(0.0)
         self._around = around._replace(sun_n=vector_of(self._normal), solar_flux=1.0, illumination=1.0)

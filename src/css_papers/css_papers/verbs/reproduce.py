@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from rich.console import Console
 from rich.text import Text
 
+from css_analysis.figure_style import keep_figures
 from css_analysis.readable_table import ReadableTable
 from css_common import places
 from css_common.preflight import reported
@@ -35,7 +36,8 @@ def run(options: argparse.Namespace) -> int:
             part = bar.add(name)
             return lambda done, total: bar.tell(part, done, total)
 
-        rows = paper.reproduce(Request(folder, cases, options.quick, progress))
+        with keep_figures():
+            rows = paper.reproduce(Request(folder, cases, options.quick, progress))
     console = Console(highlight=False)
     _print_table(paper, rows, console)
     console.print(f"page: {folder / 'index.html'}", soft_wrap=True)

@@ -27,8 +27,7 @@ _EXAMPLES = (
 )
 _EXITS = {
     0: "imported as the table stands",
-    1: "imported, but lines or values could not be read (--skip-bad makes that 0), or truth and cells contradict each "
-    "other; or the recording cannot be written",
+    1: "what could not be read was left out (--skip-bad: 0), cells contradict the truth, or nothing can be written",
     2: "table, description or options are wrong",
 }
 

@@ -7,12 +7,12 @@ from typing import Any, NamedTuple
 
 from css_analysis.fault_record import fault_texts
 from css_analysis.flight_log import FlightLog
-from css_analysis.health_panel import CONTROL, held_spells
 from css_analysis.health_record import Detection, HealthRecord, detections, untold_record
-from css_bringup.flight_changes import PARAMETER_EVENTS, read_setting
+from css_analysis.unit_spells import CONTROL, held_spells
 from css_common.fault_lines import FAULTS
 from css_common.link_kinds import LINK_FAULTS
 from css_recording.bag_reader import BagReader
+from css_recording.parameter_events import PARAMETER_EVENTS, read_setting
 
 
 class FaultsFlown(NamedTuple):

@@ -13,10 +13,10 @@ import pyarrow as pa
 
 from css_analysis.intervals import share_interval
 from css_analysis.quantities import QUANTITIES
+from css_analysis.study_record import StudyRecord
+from css_analysis.study_summary import rows_of
 from css_common.mission import SHARED, Mission, MissionError, mission_from_text
 from css_common.schema import unknown_name
-from css_monte_carlo.study import Study
-from css_monte_carlo.study_summary import rows_of
 
 _NAMED = 5  # cases that a line names
 
@@ -71,7 +71,7 @@ def refuse_unknown_criteria(mission: Mission) -> None:
             raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
 
 
-def judge(study: Study) -> list[Judged]:
+def judge(study: StudyRecord) -> list[Judged]:
     """Every configuration under the criteria of the study's mission; none where these judge flights alone."""
     mission = mission_from_text(study.manifest["mission_text"], str(study.folder))
     share = mission.values.measures.required_share

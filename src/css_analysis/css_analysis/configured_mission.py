@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A mission with another estimator, another case or without its gyro: as studies fly it, and as a command says it."""
+
+from css_common.mission import Mission, MissionError, Node
+from css_common.sensor_inputs import uses_gyro
+from css_msgs.msg import AttitudeEstimate
+
+
+def configured(
+    mission: Mission, *, case: int | None = None, estimator: str | None = None, gyro: bool = True
+) -> Mission:
+    """A mission with another case, another Sun estimator in the place of the one that flies, the gyro on or off.
+
+    An attitude filter of the graph that is named as the estimator stays where it is; the gyro is then switched for it.
+
+    Raises:
+        MissionError: there is no such estimator, or it uses no gyro and shall fly without.
+    """
+    if case is not None:
+        mission = mission.with_overrides([f"mission.case={case}"])
+    mission, _ = _with_estimator(mission, estimator)
+    return mission.with_overrides(_gyro(mission, estimator, gyro))
+
+
+def configuring_overrides(mission: Mission, estimator: str, gyro: bool) -> list[str]:
+    """KEY=VALUE texts that make of a mission what `configured` makes of it.
+
+    Raises:
+        MissionError: as `configured`.
+    """
+    with_estimator, overrides = _with_estimator(mission, estimator)
+    return [*overrides, *_gyro(with_estimator, estimator, gyro)]
+
+
+def is_attitude(node: Node) -> bool:
+    """Whether a node estimates attitude, by the message that it publishes."""
+    return any(output.message_type is AttitudeEstimate for output in node.outputs)
+
+
+def is_attitude_filter(mission: Mission, name: str) -> bool:
+    """Whether a node of the graph estimates attitude."""
+    return any(node.name == name and is_attitude(node) for node in mission.nodes)
+
+
+def _gyro(mission: Mission, estimator: str | None, gyro: bool) -> list[str]:
+    name = mission.values.graph.estimator if estimator is None else estimator
+    if uses_gyro(mission.node(name).component):
+        return [f"{name}.use_gyro={'true' if gyro else 'false'}"]
+    if not gyro:
+        raise MissionError(f"{mission.origin}: gyro off given, but {name} uses no gyro; expected gyro on for it")
+    return []
+
+
+def _with_estimator(mission: Mission, estimator: str | None) -> tuple[Mission, list[str]]:
+    """A mission in which another Sun estimator flies, from the graph or in the place of the one that flew."""
+    flown = mission.values.graph.estimator
+    if estimator in (None, flown) or is_attitude_filter(mission, str(estimator)):
+        return mission, []
+    names = [node.name for node in mission.nodes]
+    overrides = [f"graph.estimator={estimator}"]
+    if estimator not in names and flown in names:
+        entry = f"{mission.node(flown).package}/{estimator}"
+        nodes = [
+            entry if name == flown else listed for name, listed in zip(names, mission.values.graph.nodes, strict=True)
+        ]
+        overrides.insert(0, f"graph.nodes={','.join(nodes)}")
+    return mission.with_overrides(overrides), overrides

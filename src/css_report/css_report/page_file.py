@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Writing a page, and what is said of it."""
+
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from css_report.blocks import Page
+from css_report.html_page import anchor, html_of
+
+
+class ReportError(Exception):
+    """A page that cannot be made; the message says why in one line."""
+
+
+class PageFile(NamedTuple):
+    """A page that was written."""
+
+    file: Path
+    size: int  # [bytes]
+    sections: list[str]
+
+    def as_object(self) -> dict[str, Any]:
+        """What `--json` says."""
+        return {"file": str(self.file), "bytes": self.size, "sections": self.sections}
+
+
+def write_html(page: Page, file: Path) -> PageFile:
+    """Writes a page, whole or not at all.
+
+    Raises:
+        ReportError: the file cannot be written.
+    """
+    data = html_of(page).encode("utf-8", "replace")
+    temporary = file.with_name(f".{file.name}.{os.getpid()}")
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        temporary.write_bytes(data)
+        os.replace(temporary, file)
+    except OSError as error:
+        raise ReportError(f"{file}: the page cannot be written: {error.strerror}") from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+    return PageFile(file, len(data), [anchor(section.title) for section in page.sections])
