@@ -25,7 +25,7 @@ _FORBIDDEN = re.compile(r"^(numba_|NRT_|_?Py[A-Z_]|_?Z?numba|nrt_)")
 _ALLOCATION = {"malloc", "calloc", "realloc", "free", "aligned_alloc", "posix_memalign", "_Znwm", "_ZdlPv"}
 # what numba leaves of an exception: its pickled arguments
 _EXCEPTION = "picklebuf"
-_PICKLED = re.compile(r'^@\.const\.pickledata\.[0-9a-f]+ = .*? c"(.*)"', re.MULTILINE)
+_PICKLED = re.compile(r'^@\.const\.pickledata\.[0-9a-f]+(?:\.\d+)? = .*? c"(.*)"', re.MULTILINE)
 _DECLARED = re.compile(r"^declare .*?@(\"[^\"]+\"|[\w.$]+)\(", re.MULTILINE)
 _HOST_ATTRIBUTES = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _DEFINITION = re.compile(r"^(define .*?) \{$", re.MULTILINE)
@@ -93,7 +93,7 @@ def _emitted(asked: dict[str, Any]) -> dict[str, Any]:
     _optimise(module, machine)
     text = str(module)
     refuse(asked["name"], text)
-    told = llvm.parse_assembly(_with_short_names(_DEFINITION.sub(r'\1 "warn-stack-size"="0" {', text)))
+    told = llvm.parse_assembly(_with_short_names(_DEFINITION.sub(r'\1 "warn-stack-size"="0" {', text), "sunpoint.2"))
     told.verify()
     calls = {
         function.name: sorted({found.strip('"') for found in _CALLED.findall(str(function))})
@@ -154,7 +154,7 @@ def _machine(target: Target) -> llvm.TargetMachine:
 def _linked(texts: Iterable[str], target: Target, machine: llvm.TargetMachine) -> llvm.ModuleRef:
     modules = []
     for text in texts:
-        text = _with_short_names(_HOST_ATTRIBUTES.sub("", text))
+        text = _with_short_names(_HOST_ATTRIBUTES.sub("", text), "sunpoint.1")
         text = re.sub(r'^target (triple|datalayout) = ".*"\n', "", text, flags=re.MULTILINE)
         layout = f'target datalayout = "{machine.target_data}"\ntarget triple = "{target.triple}"\n'
         modules.append(llvm.parse_assembly(layout + text))
@@ -165,12 +165,17 @@ def _linked(texts: Iterable[str], target: Target, machine: llvm.TargetMachine) -
     return first
 
 
-def _with_short_names(text: str) -> str:
-    """The same with names of blocks and values that LLVM reads whole; it cuts off those beyond 1024 characters."""
+def _with_short_names(text: str, prefix: str) -> str:
+    """The same with names of blocks and values that LLVM reads whole; it cuts off those beyond 1024 characters.
+
+    Args:
+        text: intermediate code.
+        prefix: of the names that take the place of long ones; nothing in the text may be called so.
+    """
     names: dict[str, str] = {}
 
     def short(found: re.Match[str]) -> str:
-        return f"{found[1]}{names.setdefault(found[2], f'n.{len(names)}')}{found[3]}"
+        return f"{found[1]}{names.setdefault(found[2], f'{prefix}.{len(names)}')}{found[3]}"
 
     return _LONG_LABEL.sub(short, _LONG_NAME.sub(short, text))
 

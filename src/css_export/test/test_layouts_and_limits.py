@@ -221,6 +221,18 @@ def test_the_same_object_on_every_run(objects):
     assert machine_code("a", [CODE.format("a")], ["a"], TARGETS["x86_64"]).object == objects["a.o"]
 
 
+def test_blocks_with_endless_names_are_not_taken_for_one_another():
+    """LLVM cuts names off at 1024 characters when it reads them."""
+    one, other = (1100 * "b" + end for end in "xy")
+    text = (
+        "declare void @left()\ndeclare void @right()\n"
+        f"define void @f(i1 %c) {{\n  br i1 %c, label %{one}, label %{other}\n"
+        f"{one}:\n  call void @left()\n  ret void\n{other}:\n  call void @right()\n  ret void\n}}\n"
+    )
+    found = contents(machine_code("f", [text], ["f"], TARGETS["x86_64"]).object)
+    assert found.missing == ["left", "right"]
+
+
 def test_names():
     assert identifier("default") == "default_"
     assert identifier("2nd-cell") == "n2nd_cell"

@@ -66,6 +66,8 @@ def normalised_innovation(covariance, m: DirectionMeasurement) -> float:
 def update_direction(covariance, work, m: DirectionMeasurement, estimated: int) -> None:
     """Covariance and correction after a direction; errors from index `estimated` on are considered."""
     begin_update(work)
-    for k in range(min(m.dof, 3)):
-        innovation, s = innovate(covariance, work, m.rows[k], m.residual[k], m.variance)
-        update(covariance, work, innovation, s, estimated)
+    # all three, as a compiled index into a tuple has a way out by an exception unless its bound is a constant
+    for k in range(3):
+        if k < m.dof:
+            innovation, s = innovate(covariance, work, m.rows[k], m.residual[k], m.variance)
+            update(covariance, work, innovation, s, estimated)
