@@ -33,8 +33,8 @@ os.environ["ROS_LOG_DIR"] = _logs
 # Without it rclpy stores a value of the wrong type as garbage, without a word.
 os.environ["ROS_PYTHON_CHECK_FIELDS"] = "1"
 
-# Workers share the processors already; a decomposition of a small matrix by threads that wait for each other takes twenty
-# times as long.
+# Workers share the processors already; a decomposition of a small matrix by threads that wait for each other takes
+# twenty times as long.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Two runs of the same sources try the same examples. `--hypothesis-profile=explore` looks for new ones.

@@ -488,8 +488,15 @@ def flight_quantities(windows: Windows) -> dict[str, Quantity]:
     return {quantity.name: quantity for quantity in quantities(windows) if quantity.measure is not None}
 
 
-QUANTITIES = flight_quantities(Windows(late_time=1.0, detumbled_rate_deg_s=1.0))
+_ALL_WINDOWS = Windows(late_time=1.0, detumbled_rate_deg_s=1.0)
+QUANTITIES = flight_quantities(_ALL_WINDOWS)
 """What flights may be measured by, and criteria may ask for, by name."""
+
+
+def needed_windows(quantity: str) -> tuple[str, ...]:
+    """Keys of `measures` without which a quantity of `QUANTITIES` is not measured."""
+    asked_for = [name for name, value in _ALL_WINDOWS._asdict().items() if value > 0.0]
+    return tuple(n for n in asked_for if quantity not in flight_quantities(_ALL_WINDOWS._replace(**{n: 0.0})))
 
 
 def study_quantities(windows: Windows) -> tuple[Quantity, ...]:

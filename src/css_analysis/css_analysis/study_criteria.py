@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.flight_metrics import windows_of
 from css_analysis.intervals import share_interval
-from css_analysis.quantities import QUANTITIES
+from css_analysis.quantities import QUANTITIES, flight_quantities, needed_windows
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import rows_of
 from css_common.mission import SHARED, Mission, MissionError, mission_from_text
@@ -61,14 +62,18 @@ class Judged(NamedTuple):
 
 
 def refuse_unknown_criteria(mission: Mission) -> None:
-    """Looks at the names of the criteria before a study that they will judge.
+    """Looks at the criteria before a flight or study that they will judge.
 
     Raises:
-        MissionError: there is no such quantity.
+        MissionError: there is no such quantity, or the mission does not say how it is measured.
     """
+    measured = flight_quantities(windows_of(mission))
     for quantity in mission.criteria:
         if quantity not in QUANTITIES:
             raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
+        if quantity not in measured:
+            needs = " and ".join(f"measures.{name}" for name in needed_windows(quantity))
+            raise MissionError(f"{mission.origin}: {SHARED}: criteria.{quantity}: measured only with {needs} above 0")
 
 
 def judge(study: StudyRecord) -> list[Judged]:

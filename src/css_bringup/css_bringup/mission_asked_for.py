@@ -3,12 +3,10 @@
 
 import argparse
 
-from css_analysis.quantities import QUANTITIES
+from css_analysis.study_criteria import refuse_unknown_criteria
 from css_bringup.options import complain, errors
 from css_common.drawn_mission import drawn
-from css_common.mission import SHARED, Mission, load_mission
-from css_common.mission_file import MissionError
-from css_common.schema import unknown_name
+from css_common.mission import Mission, load_mission
 
 
 def mission_of(arguments: argparse.Namespace) -> Mission:
@@ -23,10 +21,7 @@ def mission_of(arguments: argparse.Namespace) -> Mission:
         if value is not None:
             overrides.append(f"mission.{key}={value}")
     mission = load_mission(arguments.mission, overrides)
-    for quantity in mission.criteria:
-        # measured by studies, which the packages that read missions know nothing of
-        if quantity not in QUANTITIES:
-            raise MissionError(f"{mission.origin}: {SHARED}: criteria.{unknown_name(quantity, QUANTITIES)}")
+    refuse_unknown_criteria(mission)
     for remark in mission.remarks:
         complain("warning:", remark)
     flies = drawn(mission)

@@ -94,8 +94,25 @@ def test_a_criterion_that_nobody_measures_is_refused_before_the_flight(tmp_path,
 
 def test_every_measured_quantity_may_be_a_criterion(tmp_path):
     limits = ", ".join(f"{quantity}: {{max: 5.0}}" for quantity in QUANTITIES)
-    mission = _mission_of(_mission_file(tmp_path, f"    criteria: {{{limits}}}\n"))
+    measures = "    measures: {late_time: 300.0, detumbled_rate_deg_s: 0.5}\n"
+    mission = _mission_of(_mission_file(tmp_path, f"{measures}    criteria: {{{limits}}}\n"))
     assert set(mission.criteria) == set(QUANTITIES)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "needs"),
+    [
+        ("power_positive_late", "measures.late_time and measures.detumbled_rate_deg_s"),
+        ("detumbled_s", "measures.detumbled_rate_deg_s"),
+    ],
+)
+def test_a_criterion_of_what_the_mission_does_not_measure_is_refused_before_the_flight(
+    tmp_path, capfd, quantity, needs
+):
+    measures = "    measures: {late_time: 0.0, detumbled_rate_deg_s: 0.0}\n"
+    file = _mission_file(tmp_path, f"{measures}    criteria: {{{quantity}: {{max: 1.0}}}}\n")
+    assert fly.main([str(file)]) == USAGE
+    assert f"criteria.{quantity}: measured only with {needs} above 0" in " ".join(capfd.readouterr().err.split())
 
 
 @pytest.mark.parametrize(("duration", "warned"), [("2.0", True), ("2.1", False)])

@@ -90,7 +90,9 @@ def _shared(design: Design) -> Iterator[Entry]:
     if not has_wheels:
         divider = max(1, round(1.0 / asked["period"]))
         yield Entry("magnetometer.divider", divider, "one measurement a second; before each the rods rest")
-        yield Entry("measures.detumbled_rate_deg_s", 4.0)
+    # a body with rods alone keeps some of its spin
+    detumbled = 0.5 if has_wheels else 4.0
+    yield Entry("measures.detumbled_rate_deg_s", detumbled, "below it the body counts as detumbled")
     yield Entry("measures.late_time", 300.0, "s, the last sunlight, whose heading error studies state")
     yield Entry("graph.nodes", _nodes(design))
     yield Entry("graph.estimator", design.estimator)
