@@ -12,12 +12,10 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from css_analysis.errors import StudyError
+
 MANIFEST, CASES, PERCENTILES = "study.json", "cases.parquet", "percentiles.parquet"
 """Files of a study; the last is written last, so that a study with it is complete."""
-
-
-class StudyError(Exception):
-    """A study that cannot be made, resumed or read; the message says why in one line."""
 
 
 @dataclass(frozen=True)

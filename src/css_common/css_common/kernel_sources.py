@@ -114,6 +114,8 @@ def _folder(package: str) -> Path | None:
     if spec is None or not spec.submodule_search_locations:
         return None
     folder = Path(next(iter(spec.submodule_search_locations)))
+    if (folder / "msg").is_dir():
+        return None  # messages: generated or made from their definitions, and in no kernel
     return folder if package in KERNEL_PACKAGES or not _is_installed(folder) else None
 
 

@@ -6,7 +6,7 @@ import math
 import erfa
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from css_common.epochs import parse_utc
@@ -31,6 +31,7 @@ ANDOYA = Launch(math.radians(69.29), math.radians(16.02), 0.0, math.radians(330.
     elevation=st.floats(0.5, math.pi / 2),
     apogee=st.floats(20e3, 1500e3),
 )
+@example(latitude=0.0, longitude=0.0, azimuth=-0.75, elevation=0.8515625, apogee=36519.0)
 def test_the_arc_leaves_the_site_and_reaches_its_apogee(latitude, longitude, azimuth, elevation, apogee):
     launch = Launch(latitude, longitude, 300.0, azimuth, elevation, apogee)
     orbit = ballistic_arc(launch, EPOCH)
@@ -38,8 +39,10 @@ def test_the_arc_leaves_the_site_and_reaches_its_apogee(latitude, longitude, azi
     r_n, v_n = orbit_states(orbit, EPOCH, time)
     site = erfa.gd2gc(1, longitude, latitude, 300.0)
     np.testing.assert_allclose(np.asarray(dcm_en_at(EPOCH)) @ r_n[0], site, atol=2e-3)
-    energy = 0.5 * np.sum(v_n**2, axis=1) - EARTH_MU / np.linalg.norm(r_n, axis=1)
-    np.testing.assert_allclose(energy, energy[0], rtol=1e-11)
+    potential = EARTH_MU / np.linalg.norm(r_n, axis=1)
+    energy = 0.5 * np.sum(v_n**2, axis=1) - potential
+    # deep in the Earth, where a shallow ellipse has its perigee, it is the small difference of large numbers
+    assert np.all(np.abs(energy - energy[0]) <= 1e-11 * abs(energy[0]) + 1e-13 * potential)
     highest = int(np.argmax(np.linalg.norm(r_n, axis=1)))
     assert 0 < highest < len(time) - 1
     fine = time[highest] + np.linspace(-0.5, 0.5, 1001)

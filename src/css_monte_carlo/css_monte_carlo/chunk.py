@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pyarrow as pa
 
+from css_analysis.errors import StudyError
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
 from css_common.processors import usable_processors
@@ -17,7 +18,6 @@ from css_monte_carlo.case_missions import drawn_columns
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import Tallies
 from css_monte_carlo.drawn_faults import COLUMN, fault_column, has_faults
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.health_tallies import HealthTallies
 from css_monte_carlo.loop import Cases, Vehicle, fly_block
 from css_monte_carlo.measures import CaseTallies

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from typing import Any, NamedTuple, Self
 
+from css_analysis.errors import StudyError
 from css_common.processors import usable_processors
 from css_monte_carlo.chunk import ChunkTask, flown_task
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.study_folder import parquet_bytes
 
 

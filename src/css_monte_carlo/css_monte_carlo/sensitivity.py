@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from css_analysis.errors import StudyError
 from css_analysis.intervals import LEVEL
 from css_analysis.study_summary import rows_of, summaries_of
 from css_common.mission import Mission, mission_from_text
 from css_common.sampling import groups_of, saltelli_problem
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.study import Study
 
 _LEAST_POINTS = 8

@@ -9,6 +9,7 @@ import time
 import numpy as np
 
 from css_analysis.configured_mission import is_attitude
+from css_analysis.errors import StudyError
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import Mission, MissionError
 from css_common.random_streams import RandomKey, random_key
@@ -16,7 +17,6 @@ from css_monte_carlo.attitude_guess import takes_guess, with_guess
 from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.case_missions import case_mission
 from css_monte_carlo.direct_flight import fly_checked
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.log_tallies import tally_attitudes, tally_headings
 from css_monte_carlo.measures import ATTITUDE, HEADING, CaseTallies
 from css_monte_carlo.mission_parts import is_heading

@@ -17,7 +17,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from css_analysis.study_record import CASES, MANIFEST, PERCENTILES, StudyError, is_complete
+from css_analysis.errors import StudyError
+from css_analysis.study_record import CASES, MANIFEST, PERCENTILES, is_complete
 
 CHUNKS = "chunks"
 

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import differential_evolution
 
+from css_analysis.errors import StudyError
 from css_analysis.flight_metrics import windows_of
 from css_analysis.study_summary import rows_of, summaries_of
 from css_common.drawn_mission import values_at
@@ -25,7 +26,6 @@ from css_common.schema import ParameterError
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
 from css_monte_carlo.study import Configuration, Study

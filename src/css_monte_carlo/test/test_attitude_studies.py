@@ -4,13 +4,13 @@
 import numpy as np
 import pytest
 
+from css_analysis.errors import StudyError
 from css_analysis.flight_metrics import Windows
 from css_analysis.quantities import attitude_quantities, study_quantities
 from css_analysis.study_summary import configuration_objects, rows_of
 from css_common.mission import load_mission, mission_from_text
 from css_monte_carlo import study
 from css_monte_carlo.attitude_tallies import SAMPLED
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.schedulers import DaskScheduler
 from css_monte_carlo.study import Configuration, read_study, run_study
 

@@ -103,7 +103,7 @@ def test_limits_are_included_and_no_value_meets_nothing():
     assert (judged.met, judged.required, judged.passed) == (1, 2, False)
     missed = {key.split(" ")[0]: cases for key, cases in judged.missed.items() if cases}
     assert missed == {"detumbled_s.max": [1, 2], "power_positive_late.min": [3]}
-    assert judged.lines()[0] == "FAIL  1 of 4 cases meet the criteria, must be 2  (wls)"
+    assert judged.lines()[0] == "FAIL  1 of 4 cases meet the criteria, must be 2, 95 % interval 0.6% to 80.6%  (wls)"
     assert judge(study_of(0.25, [100.0, 100.1, None, 50.0], [0.9, 0.95, 1.0, 0.89]))[0].passed
 
 

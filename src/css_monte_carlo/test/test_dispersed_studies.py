@@ -7,13 +7,13 @@ import json
 import numpy as np
 import pytest
 
+from css_analysis.errors import StudyError
 from css_analysis.estimator_runs import estimator_runs
 from css_common.drawn_mission import drawn
 from css_common.mission import load_mission
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.commands.monte_carlo import main
 from css_monte_carlo.direct_flight import fly_directly
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.sensitivity import _indices, sensitivities
 from css_monte_carlo.study import Configuration, run_study

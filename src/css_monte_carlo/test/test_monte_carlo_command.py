@@ -27,6 +27,7 @@ def test_json_on_the_last_line(tmp_path, capsys, monkeypatch):
         "configurations",
         "out",
         "warnings",
+        "page",
     ]
     assert (result["mission"], result["cases"], result["steps"], result["out"]) == ("okeefe_2013", 3, 30, str(folder))
     flown = [(row["estimator"], row["gyro"], *row["overrides"]) for row in result["configurations"]]
@@ -36,7 +37,8 @@ def test_json_on_the_last_line(tmp_path, capsys, monkeypatch):
         for estimator in ("ekf", "wavg")
         for gyro in ("on", "off")
     ]
-    assert sorted(file.name for file in folder.iterdir()) == ["cases.parquet", "percentiles.parquet", "study.json"]
+    files = ["cases.parquet", "mission.yaml", "percentiles.parquet", "report.html", "study.json"]
+    assert sorted(file.name for file in folder.iterdir()) == files
     rows = [line.split()[:3] for line in lines[:-1] if line.split()[:1] in (["ekf"], ["wavg"])]
     assert rows == [[name, gyro, noise] for name in ("ekf", "wavg") for gyro in ("on", "off") for noise in ("0", "0.1")]
 
@@ -80,7 +82,7 @@ WRONG = {
     "threads": (["--threads", "0"], "--threads: 0 given, expected at least 1"),
     "guess": (["--guess", "200"], "--guess: 200 given, expected 0 to 180 [deg]"),
     "sample": (["--sample", "0"], "--sample: 0 given, expected seconds above 0"),
-    "duration": (["--duration", "-5"], "mission.duration: -5.0 given, expected above 0 and at most 3.2e+07 [s]"),
+    "duration": (["--duration", "-5"], "mission.duration: -5.0 given, expected above 0 and at most 3.2e+08 [s]"),
     "seed": (["--seed", "-1"], "mission.seed: -1 given, expected at least 0"),
     "estimator with a typo": (["--estimators", "efk"], "did you mean css_estimation/ekf?"),
     "name of a file": (["--sweep", "mission.name=../x,b"], "mission.name: '../x' given, expected a name for files"),

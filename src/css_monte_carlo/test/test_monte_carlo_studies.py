@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from css_analysis.errors import StudyError
 from css_analysis.study_summary import rows_of
 from css_common.mission import load_mission
 from css_monte_carlo import study
 from css_monte_carlo.chunk import ChunkTask
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.schedulers import ChunkResult, DaskScheduler, Scheduler, ThreadScheduler, run_task
 from css_monte_carlo.study import Configuration, read_study, run_study
 from css_monte_carlo.study_summary import study_object

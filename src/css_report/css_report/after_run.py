@@ -1,18 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page that flights, replays and studies end with."""
 
-import argparse
 from collections.abc import Callable
 from pathlib import Path
 
 from css_common.command import complain
 from css_report.blocks import Page
-from css_report.page_file import ReportError, write_html
-
-
-def add_page_option(parser: argparse.ArgumentParser) -> None:
-    """Whether a run ends with a page."""
-    parser.add_argument("--no-report", action="store_false", dest="report", help="end without writing a page")
+from css_report.errors import ReportError
+from css_report.page_file import write_html
 
 
 def write_page_after(prog: str, page: Callable[[], Page], file: Path) -> Path | None:

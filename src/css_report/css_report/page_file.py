@@ -7,11 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from css_report.blocks import Page
+from css_report.errors import ReportError
 from css_report.html_page import anchor, html_of
-
-
-class ReportError(Exception):
-    """A page that cannot be made; the message says why in one line."""
 
 
 class PageFile(NamedTuple):

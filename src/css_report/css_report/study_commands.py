@@ -14,7 +14,7 @@ from css_analysis.quantities import Summary
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import summaries_of
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
-from css_report.page_file import ReportError
+from css_report.errors import ReportError
 from css_report.study_plots import configuration_label, values_of
 
 MISSION_FILE = "mission.yaml"

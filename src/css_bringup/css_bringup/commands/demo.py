@@ -11,7 +11,7 @@ from pathlib import Path
 
 from css_bringup.options import add_domain_option, add_mission_options, add_output_options, guarded
 from css_common.command import CommandParser, command_parser, implementation
-from css_report.after_run import add_page_option
+from css_report.page_option import add_page_option
 
 _EXAMPLES = ("", "okeefe_2013 --duration 600 --out bags/first", "okeefe_2013 --case 7 --figures figures")
 _EXITS = {0: "flown, and all pass criteria of the mission met", 1: "the flight failed or missed a criterion"}

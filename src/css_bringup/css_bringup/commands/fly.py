@@ -5,7 +5,7 @@ import sys
 
 from css_bringup.options import add_domain_option, add_mission_options, add_output_options, add_security_option, guarded
 from css_common.command import CommandParser, command_parser, implementation
-from css_report.after_run import add_page_option
+from css_report.page_option import add_page_option
 
 _EXAMPLES = (
     "okeefe_2013",

@@ -14,7 +14,7 @@ from pathlib import Path
 
 from css_bringup.options import guarded
 from css_common.command import CommandParser, command_parser, implementation
-from css_report.after_run import add_page_option
+from css_report.page_option import add_page_option
 
 _EXAMPLES = (
     "bags/FLIGHT",

@@ -10,11 +10,11 @@ import signal
 import sys
 from collections.abc import Sequence
 
+from css_analysis.errors import StudyError
 from css_common.command import CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
 from css_design.budget.case_counts import CASES, QUICK_CASES
 from css_design.errors import DesignError
-from css_monte_carlo.errors import StudyError
 from css_recording.errors import BagError
 
 _EXAMPLES = ("okeefe_2013", "mysat.yaml --cases 200 --json", "cubesat_3u_sun_filter --quick", "bags/first")

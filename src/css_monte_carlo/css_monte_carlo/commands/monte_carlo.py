@@ -11,10 +11,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from css_analysis.errors import StudyError
 from css_common.command import MISSION_HELP, CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
-from css_monte_carlo.errors import StudyError
-from css_report.after_run import add_page_option
+from css_report.page_option import add_page_option
 
 _EXAMPLES = (
     "okeefe_2013 --cases 1000 --estimators wavg ekf --gyro on off",

@@ -10,13 +10,13 @@ from pathlib import Path
 
 from rich.console import Console
 
+from css_analysis.errors import StudyError
 from css_analysis.study_criteria import judge, refuse_unknown_criteria
 from css_common import places
 from css_common.command import FAILED, INTERRUPTED
 from css_common.dispersions import SECTION
 from css_common.mission import Mission, load_mission
 from css_common.sampling import design_size
-from css_monte_carlo.errors import StudyError
 from css_monte_carlo.mission_parts import measured_estimators
 from css_monte_carlo.progress import CaseProgress, progress_bar
 from css_monte_carlo.schedulers import DaskScheduler

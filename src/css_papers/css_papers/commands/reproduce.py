@@ -6,9 +6,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from css_analysis.errors import StudyError
 from css_common.command import CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
-from css_monte_carlo.errors import StudyError
 from css_papers.errors import ReproductionError
 from css_papers.paper_names import CASES, QUICK_CASES, paper_names
 

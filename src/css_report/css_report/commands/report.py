@@ -10,11 +10,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from css_analysis.study_record import StudyError
+from css_analysis.errors import StudyError
 from css_common.command import CommandParser, command_parser, guarded, implementation
 from css_common.mission_file import MissionError
 from css_recording.errors import BagError
-from css_report.page_file import ReportError
+from css_report.errors import ReportError
 
 _EXAMPLES = ("bags/reference -o reference.html", "bags/FLIGHT --open", "studies/STUDY --against studies/OTHER --json")
 _EXITS = {0: "the page is written", 1: "the page is written, and no browser could be started"}

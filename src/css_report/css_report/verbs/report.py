@@ -9,8 +9,9 @@ from pathlib import Path
 from css_analysis.study_record import MANIFEST, read_record
 from css_common.command import FAILED, complain
 from css_common.progress_lines import still_working
+from css_report.errors import ReportError
 from css_report.flight_page import flight_page, read_for_page
-from css_report.page_file import PageFile, ReportError, write_html
+from css_report.page_file import PageFile, write_html
 from css_report.places import page_of
 from css_report.study_page import study_page
 
