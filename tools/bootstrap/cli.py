@@ -24,7 +24,7 @@ from css_common.network import NetworkError, stay_on_this_machine
 
 # Two processes, because every test of the graph waits for its nodes more than it computes.
 # The tests of a file on one processor: what they share is made once. In their order: the long ones come first.
-ALL_TESTS = ["-q", "-n", "2", "--dist", "loadfile", "--no-loadscope-reorder"]
+ALL_TESTS = ["-q", "-n", "2", "--dist", "loadfile", "--no-loadscope-reorder", "-m", "not long"]
 
 
 def main(arguments: list[str]) -> int:
