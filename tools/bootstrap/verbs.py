@@ -52,7 +52,7 @@ VERBS = {
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
     "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
-    "test": Verb("run the linters and the tests, or with arguments those tests alone; -m long: the longest", ros=True),
+    "test": Verb("run the linters and the tests; FILE ...: those alone, -m long: the longest", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
 }
