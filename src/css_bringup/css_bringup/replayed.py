@@ -130,6 +130,8 @@ class Replayed:
         """Closes the books at the end of the recording."""
         self.matcher.give_up()
         self.retrace.finish()
+        warning = self.stepper.component.standing().warning
+        self.notes += [warning] if warning else []
         self.notes += self.retrace.notes
         self.notes += [
             f"{change.text()} was set about stamp {change.stamp_ns} ns; the step was not found, "

@@ -5,13 +5,14 @@ Three passes of `scipy.optimize.least_squares`, all derivatives in closed form. 
 outliers do not lead it astray; then the noise is read off the residuals, what is beyond 5 sigma is left out and named,
 and the loss is square. In the last pass the Earth shines on the normals found.
 
-The variance of an output is white noise, an error relative to the output, and clouds on the light of the Earth. The
-covariance of the result is that of the estimator under errors as they are: relative ones as alike in all cells as the
-residuals are, clouds that last for two minutes, an Earth that nobody predicts for all of the recording; scaled by what
-the sums of residuals over such stretches are above expectation (Huber's sandwich, with a model of the middle).
+An output errs by white noise, by an error relative to it, and by clouds on the light of the Earth. The relative error
+is as alike in all cells of an instant as the residuals are; clouds stay for as long as the Sun filter has it, and less
+long on a body that turns. Weights are those of the whole covariance of these errors (`noise_whitening`): with each
+output weighed by itself, an error that all cells have in common hides the ratios between them, which tell tilts and
+scales. The covariance of the result is scaled by what sums of white residuals over stretches of two minutes are above
+expectation, and has the light of an Earth that nobody predicts for all of the recording (Huber's sandwich).
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,8 +20,9 @@ from scipy.optimize import least_squares
 
 from css_calibration.attitude_track import Track
 from css_calibration.cell_data import CellData
-from css_calibration.cell_fit_model import EARTH, PER_CELL
+from css_calibration.cell_fit_model import DARK, EARTH, PER_CELL
 from css_calibration.noise_model import Noise, noise_of, slow_factor
+from css_calibration.noise_whitening import Errors
 from css_calibration.unknowns import Unknowns
 
 OUTLIER = 5.0
@@ -77,16 +79,32 @@ class _Problem:
         self.rows, self.cells = np.nonzero(counts)
         self.noise = noise
         self.sigma = np.ones(len(self.rows))
+        self.errors: Errors | None = None
         self._columns = unknowns.column_of()
 
     def split(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return x[: self.unknowns.count], x[self.unknowns.count :]
 
-    def weigh(self, x: np.ndarray) -> None:
-        """Standard deviations by what is expected at `x`."""
+    def weigh(self, x: np.ndarray, *, whole: bool) -> None:
+        """Takes the errors for what is expected at `x`.
+
+        Args:
+            whole: with what one output has in common with another; else each has its own error.
+        """
         parameters, earth = self.unknowns.parameters(x)
         out, slopes, _ = self._placed(x)[0].predicted(parameters, earth)
-        self.sigma = np.sqrt(self.noise.variance(out, slopes[:, :, EARTH], parameters))[self.rows, self.cells]
+        earthly, at = slopes[:, :, EARTH], (self.rows, self.cells)
+        if whole:
+            lit = (out - parameters[:, DARK])[at]
+            self.errors = self.noise.errors(*at, lit, earthly[at], self.data.turned, self.data.time)
+        else:
+            self.sigma = np.sqrt(self.noise.variance(out, earthly, parameters))[at]
+
+    def weighed(self, values: np.ndarray) -> np.ndarray:
+        """Residuals (K,) or derivatives (K, C) of outputs in units of their errors."""
+        rows = values.reshape(len(values), -1)
+        rows = rows / self.sigma[:, None] if self.errors is None else self.errors.whitened(rows)
+        return rows.reshape(values.shape)
 
     def _placed(self, x: np.ndarray) -> tuple[CellData, np.ndarray | None, np.ndarray | None]:
         if self.track is None:
@@ -98,7 +116,7 @@ class _Problem:
     def residuals(self, x: np.ndarray) -> np.ndarray:
         data, dcm_bn, e = self._placed(x)
         out, _, _ = data.predicted(*self.unknowns.parameters(x))
-        off = (out - data.voltages)[self.rows, self.cells] / self.sigma
+        off = self.weighed((out - data.voltages)[self.rows, self.cells])
         parts = [off]
         if self.track is not None:
             assert dcm_bn is not None and e is not None
@@ -124,7 +142,7 @@ class _Problem:
         if self.unknowns.earth:
             out[:, count - 1] = slopes[self.rows, self.cells, EARTH] * scale[-1]
         if self.track is None:
-            return out / self.sigma[:, None]
+            return self.weighed(out)
         assert dcm_bn is not None and e is not None
         part = self.track._rows(self.rows)
         out[:, count:] = part.by_unknowns(e[self.rows], self.track.sun_n[self.rows], turns[self.rows, self.cells])
@@ -133,7 +151,7 @@ class _Problem:
         _, links = self.track.links(of_track)
         below = np.zeros((len(field) + len(links), len(x)))
         below[:, count:] = np.vstack([field, links])
-        return np.vstack([out / self.sigma[:, None], below])
+        return np.vstack([self.weighed(out), below])
 
 
 def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: np.ndarray | None = None) -> Fit:
@@ -152,7 +170,7 @@ def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: n
     noise = Noise(0.02, 0.02, 0.0, 0.3 if data.earth_known else 0.0)
     for number in range(_PASSES + 1):
         problem = _Problem(data, unknowns, track, counts & ~outliers, noise)
-        problem.weigh(x)
+        problem.weigh(x, whole=number > 0)
         result = least_squares(
             problem.residuals, x, jac=problem.jacobian, loss="soft_l1" if number == 0 else "linear",
             f_scale=_SOFT, xtol=_TOLERANCE, ftol=_TOLERANCE, gtol=1e-9, max_nfev=40,
@@ -165,8 +183,8 @@ def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: n
             sigma = np.sqrt(noise.variance(expected, earthly, parameters))
             outliers = counts & (np.abs(off) > OUTLIER * sigma)
     problem = _Problem(data, unknowns, track, counts & ~outliers, noise)
-    problem.weigh(x)
-    covariance, information, slow = _covariance(problem, x, off, expected, earthly, parameters)
+    problem.weigh(x, whole=True)
+    covariance, information, slow = _covariance(problem, x)
     return Fit(
         unknowns, x, covariance, information, np.where(counts, -off, np.nan), outliers, noise, slow, float(result.cost)
     )
@@ -180,42 +198,16 @@ def _off(problem: _Problem, x: np.ndarray, counts: np.ndarray) -> tuple[np.ndarr
     return np.where(counts, out - data.voltages, 0.0), out, slopes[:, :, EARTH], parameters
 
 
-def _covariance(
-    problem: _Problem, x: np.ndarray, off: np.ndarray, expected: np.ndarray, earthly: np.ndarray, parameters: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, float]:
+def _covariance(problem: _Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     jacobian = problem.of_data(x)
-    information = jacobian.T @ jacobian
     count = len(problem.rows)
-    of_cells = jacobian[:count]
-    noise, rows, cells = problem.noise, problem.rows, problem.cells
-    sigma = problem.sigma
-    others = jacobian[count:]
-    middle = others.T @ others + np.eye(len(x))
-    white = noise.white / sigma
-    middle_cells = (of_cells * white[:, None] ** 2).T @ of_cells
-    relative = noise.relative * np.abs(expected[rows, cells]) / sigma
-    middle_cells += (1.0 - noise.alike) * (of_cells * relative[:, None] ** 2).T @ of_cells
-    middle_cells += noise.alike * _outer(of_cells * relative[:, None], rows)
-    stretch = np.floor(problem.data.time / noise.lasting_s).astype(np.int64)[rows] * problem.data.voltages.shape[1]
-    clouds = noise.clouds * np.abs(earthly[rows, cells]) / sigma
-    middle_cells += _outer(of_cells * clouds[:, None], stretch + cells)
-    if noise.unknown > 0.0:
-        middle_cells += _outer(of_cells * (noise.unknown / sigma)[:, None], cells)
-    slow = slow_factor(noise, problem.data.time, rows, cells, off, expected, earthly)
+    of_cells, others = jacobian[:count], jacobian[count:]
+    information = jacobian.T @ jacobian
+    slow = slow_factor(problem.residuals(x)[:count], problem.data.time[problem.rows], problem.cells)
+    middle = slow**2 * of_cells.T @ of_cells + others.T @ others + np.eye(len(x))
+    if problem.noise.unknown > 0.0:
+        whole = np.equal.outer(problem.cells, np.arange(problem.data.voltages.shape[1]))
+        by_light = of_cells.T @ problem.weighed(problem.noise.unknown * whole)
+        middle += by_light @ by_light.T
     inverse = np.linalg.inv(information + np.eye(len(x)))
-    covariance = inverse @ (middle + slow**2 * middle_cells) @ inverse
-    return covariance, information, slow
-
-
-def _outer(weighted: np.ndarray, groups: np.ndarray) -> np.ndarray:
-    """Sum over groups of the outer products of the sums of their rows."""
-    _, place = np.unique(groups, return_inverse=True)
-    sums = np.zeros((int(place.max(initial=-1)) + 1, weighted.shape[1]))
-    np.add.at(sums, place, weighted)
-    return sums.T @ sums
-
-
-def root_mean_square(values: np.ndarray) -> float:
-    """Of the finite ones; 0 without any."""
-    finite = values[np.isfinite(values)]
-    return math.sqrt(float(np.mean(finite**2))) if len(finite) else 0.0
+    return inverse @ middle @ inverse, information, slow

@@ -40,6 +40,7 @@ class CellData:
         albedo: (M, N) of the mean Earth.
         warmth: (M,) temperature less that of reference [K].
         time: (M,) [s].
+        turned: (M,) angle [rad] by which the body has turned up to then, by its attitude; 0 where that is unknown.
         response: of the cells.
         earth_known: `albedo` is a prediction; else there may be light that nobody predicts.
     """
@@ -53,6 +54,7 @@ class CellData:
     albedo: np.ndarray
     warmth: np.ndarray
     time: np.ndarray
+    turned: np.ndarray
     response: Response
     earth_known: bool
 
@@ -62,7 +64,7 @@ class CellData:
 
     def some(self, rows: np.ndarray) -> "CellData":
         """The same at some of the instants."""
-        columns = ("voltages", "sun_b", "intensity", "seen", "usable", "albedo", "warmth", "time")
+        columns = ("voltages", "sun_b", "intensity", "seen", "usable", "albedo", "warmth", "time", "turned")
         chosen: dict[str, Any] = {name: np.ascontiguousarray(getattr(self, name)[rows]) for name in columns}
         return replace(self, **chosen)
 
@@ -136,11 +138,19 @@ def cell_data(
         normals = normals_b if parameters is None else normals_of(normals_b, parameters)
         albedo = earth_light(recorded, around, dcm_bn, normals)
         usable &= (np.isfinite(dcm_bn).all(axis=(1, 2)) | gone)[:, None]
+    turned = np.zeros(len(sun_b)) if dcm_bn is None else _turned(dcm_bn)
     warmth = np.zeros(len(sun_b))
     if recorded.temperature is not None:
         warmth = recorded.temperature - reference_temperature
     voltages = np.where(np.isfinite(recorded.voltages), recorded.voltages, 0.0)
     return CellData(
         normals_b, voltages, np.ascontiguousarray(sun_b), np.where(gone, 0.0, around.intensity), seen, usable, albedo,
-        warmth, recorded.time, response, earth_known,
+        warmth, recorded.time, turned, response, earth_known,
     )  # fmt: skip
+
+
+def _turned(dcm_bn: np.ndarray) -> np.ndarray:
+    """(M,) sum of the angles [rad] between successive attitudes (M, 3, 3)."""
+    trace = np.einsum("kij,kij->k", dcm_bn[1:], dcm_bn[:-1])
+    angles = np.arccos(np.clip(0.5 * (trace - 1.0), -1.0, 1.0))
+    return np.concatenate([np.zeros(1), np.cumsum(np.nan_to_num(angles))])

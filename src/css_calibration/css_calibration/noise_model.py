@@ -6,12 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_calibration.noise_whitening import Errors
+
 _NORMAL = 1.4826  # standard deviation over median absolute deviation of normal noise
 _FEW = 30
 _DARK, _LIT = 0.05, 0.3
 _CLOUDS = 0.3  # of the light of the Earth on one cell, 1 sigma, as the Sun filter has it (albedo.cloud_sigma)
 _LEAST = 1e-4
-_STRETCH_S = 140.0  # in which clouds stay what they are: twice albedo.cloud_time
+_BEYOND = 4.0  # standard deviations to which an error counts at most
+_CLOUD_S, _CLOUD_ANGLE = 70.0, math.radians(50.0)  # in which clouds become others: albedo.cloud_time, cloud_angle_deg
+_STRETCH_S = 2.0 * _CLOUD_S
 
 
 class Noise(NamedTuple):
@@ -22,12 +26,34 @@ class Noise(NamedTuple):
     alike: float  # share of the relative error's variance that all cells have in common at an instant
     clouds: float  # [-] of the predicted light of the Earth, 1 sigma
     unknown: float = 0.0  # [-] light of an Earth that nobody predicts, 1 sigma
-    lasting_s: float = _STRETCH_S  # [s] for which clouds stay
 
     def variance(self, expected: np.ndarray, earthly: np.ndarray, parameters: np.ndarray) -> np.ndarray:
         """(M, N) of outputs, by what is expected of them and by their slope (M, N) by the Earth's brightness."""
         dark = parameters[None, :, 1]
         return self.white**2 + (self.relative * (expected - dark)) ** 2 + (self.clouds * earthly) ** 2
+
+    def errors(
+        self,
+        instant: np.ndarray,
+        cell: np.ndarray,
+        lit: np.ndarray,
+        earthly: np.ndarray,
+        turned: np.ndarray,
+        time: np.ndarray,
+    ) -> Errors:
+        """The same of K outputs, with what one has in common with another.
+
+        Args:
+            instant, cell: (K,) of each, instants growing.
+            lit: (K,) expected above the dark level.
+            earthly: (K,) slope by the Earth's brightness.
+            turned: (M,) [rad] by which the body has turned up to each instant.
+            time: (M,) [s].
+        """  # fmt: skip
+        gone = np.diff(time, prepend=time[:1]) / _CLOUD_S + np.diff(turned, prepend=turned[:1]) / _CLOUD_ANGLE
+        own = self.white**2 + (1.0 - self.alike) * (self.relative * lit) ** 2
+        common = math.sqrt(self.alike) * self.relative * lit
+        return Errors(instant, cell, np.exp(-gone), own, common, self.clouds * earthly)
 
 
 def spread(values: np.ndarray) -> float:
@@ -46,24 +72,25 @@ def noise_of(
     white = max(_LEAST, spread(chosen))
     relative, alike = 0.0, 0.0
     if lit.sum() >= _FEW:
-        cloudy = np.median((clouds * earthly[lit] / expected[lit]) ** 2)
-        square = spread(off[lit] / expected[lit]) ** 2 - (white / float(np.median(expected[lit]))) ** 2 - cloudy
-        relative = math.sqrt(max(0.0, float(square)))
-        alike = _alike(np.where(lit, off / np.where(lit, expected, 1.0), 0.0), lit)
+        cloudy = float(np.mean((clouds * earthly[lit] / expected[lit]) ** 2))
+        own = white**2 * float(np.mean(expected[lit] ** -2))
+        total, shared = _moments(np.where(lit, off / np.where(lit, expected, 1.0), 0.0), lit)
+        square = max(total - own - cloudy, shared, 0.0)
+        relative, alike = math.sqrt(square), shared / square if square > 0.0 else 0.0
     return Noise(white, relative, alike, clouds, 0.0 if earth_known else _unknown(off, expected, counts))
 
 
-def _alike(relative: np.ndarray, lit: np.ndarray) -> float:
-    """Correlation between the relative errors of cells that are lit at the same instant, 0 to 1."""
-    limit = 4.0 * spread(relative[lit])
+def _moments(relative: np.ndarray, lit: np.ndarray) -> tuple[float, float]:
+    """Mean square of relative errors (M, N) of lit outputs, and that of what cells of an instant have in common."""
+    limit = _BEYOND * spread(relative[lit])
     z = np.clip(relative, -limit, limit)
-    several = lit.sum(axis=1) >= 2
-    if several.sum() < _FEW:
-        return 1.0
-    squares = (z[several] ** 2).sum(axis=1)
-    products = z[several].sum(axis=1) ** 2 - squares
-    pairs = ((lit[several].sum(axis=1) - 1) * squares).sum()
-    return float(np.clip(products.sum() / pairs, 0.0, 1.0)) if pairs > 0.0 else 1.0
+    squares = (z**2).sum(axis=1)
+    total = float(squares.sum() / lit.sum())
+    count = lit.sum(axis=1)
+    pairs = float((count * (count - 1)).sum())
+    if pairs < _FEW:
+        return total, total
+    return total, max(0.0, float((z.sum(axis=1) ** 2 - squares).sum() / pairs))
 
 
 def _unknown(off: np.ndarray, expected: np.ndarray, counts: np.ndarray) -> float:
@@ -78,23 +105,14 @@ def _unknown(off: np.ndarray, expected: np.ndarray, counts: np.ndarray) -> float
     return math.sqrt(max(0.0, float(np.mean(np.square(means))) - within**2))
 
 
-def slow_factor(
-    noise: Noise,
-    time: np.ndarray,
-    rows: np.ndarray,
-    cells: np.ndarray,
-    off: np.ndarray,
-    expected: np.ndarray,
-    earthly: np.ndarray,
-) -> float:
-    """How far sums of residuals over stretches of one cell are above what their noise explains; at least 1."""
-    block = np.floor(time / noise.lasting_s).astype(np.int64)[rows]
-    key = block * off.shape[1] + cells
-    _, place = np.unique(key, return_inverse=True)
-    size = int(place.max(initial=-1)) + 1
-    sums, variances, clouded = np.zeros(size), np.zeros(size), np.zeros(size)
-    np.add.at(sums, place, off[rows, cells])
-    np.add.at(variances, place, noise.white**2 + (noise.relative * expected[rows, cells]) ** 2)
-    np.add.at(clouded, place, noise.clouds * np.abs(earthly[rows, cells]))
-    ratio = sums**2 / np.maximum(variances + clouded**2, 1e-12)
-    return math.sqrt(max(1.0, float(np.mean(ratio)))) if size else 1.0
+def slow_factor(white: np.ndarray, time: np.ndarray, cells: np.ndarray) -> float:
+    """How far sums of residuals over stretches of one cell are above what their noise explains; at least 1.
+
+    Args:
+        white: (K,) residuals, of unit variance.
+        time: (K,) [s]; cells: (K,) of each.
+    """
+    stretch = np.floor(time / _STRETCH_S).astype(np.int64) * (int(cells.max(initial=0)) + 1) + cells
+    _, place, count = np.unique(stretch, return_inverse=True, return_counts=True)
+    sums = np.bincount(place, white)
+    return math.sqrt(max(1.0, float(np.mean(sums**2 / count)))) if len(count) else 1.0

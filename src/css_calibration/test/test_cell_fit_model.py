@@ -20,7 +20,7 @@ def data(sun_b, curve=0, **changed):
     fields = {
         "voltages": np.zeros(shape), "sun_b": sun_b, "intensity": np.ones(len(sun_b)), "seen": np.ones(shape, bool),
         "usable": np.ones(shape, bool), "albedo": np.zeros(shape), "warmth": np.zeros(len(sun_b)),
-        "time": np.arange(len(sun_b), dtype=float),
+        "time": np.arange(len(sun_b), dtype=float), "turned": np.zeros(len(sun_b)),
     }  # fmt: skip
     return CellData(NORMALS, response=response_of(curve), earth_known=True, **(fields | changed))
 

@@ -59,6 +59,8 @@ class Input:
             given it again.
         restamped: messages bear the time of their arrival, whatever stamp they come with.
         sensor_frame: the frame_id that is expected in the place of that of `frame`; empty: that.
+        held_s: above 0 a quantity that changes slowly and is told at times of its own: nobody waits for it, and each
+            cycle is given the newest message that is not after its stamp, nor older than so many seconds.
     """
 
     key: str
@@ -76,6 +78,7 @@ class Input:
     once: bool = False
     restamped: bool = False
     sensor_frame: str = ""
+    held_s: float = 0.0
 
     @property
     def may_be_silent(self) -> bool:

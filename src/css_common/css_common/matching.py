@@ -56,6 +56,7 @@ class Matcher:
         self._pending: dict[int, dict[str, Sample]] = {}
         self._latest: dict[str, Sample] = {}
         self._newest: dict[str, int] = {}
+        self._held: dict[str, list[Sample]] = {key: [] for key, i in self.inputs.items() if i.held_s > 0.0}
         self._done = _NEVER
         self._missed: dict[str, Missed] = {}
         self._late: dict[str, Missed] = {}
@@ -72,7 +73,7 @@ class Matcher:
         """Waits from now on for the inputs that are heeded and present."""
         self.deadline_ns = round(self._component.values.io.deadline * 1e9)
         self._unheeded = frozenset(key for key, source in inputs.items() if not source.heeded)
-        awaited = self._present - self._unheeded
+        awaited = self._present - self._unheeded - self._held.keys()
         self._speaking = (self._speaking & awaited) | (awaited - self.awaited)
         self.awaited = awaited
         for key in self._unheeded:
@@ -82,6 +83,8 @@ class Matcher:
         """Takes a message; returns the cycles that are now complete, oldest first."""
         if key in self._unheeded:
             return []
+        if key in self._held:
+            return self._hold(key, sample)
         if sample.frame_id == GAP:
             return self._offer_gap(key, sample)
         if not self.exact:
@@ -100,6 +103,21 @@ class Matcher:
                 return []
             self._begin_anew()
         return self._put(stamp, key, sample)
+
+    def _hold(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
+        """Keeps a message for the cycles from its stamp on."""
+        if sample.frame_id != GAP:
+            self._held[key] = [*self._held[key][-_MOST_PENDING:], sample]
+        return []
+
+    def _held_at(self, key: str, stamp: int) -> Sample | None:
+        """The newest message of a held input that is not after a stamp, nor too old; older ones are forgotten."""
+        kept = self._held[key]
+        newest = max((s for s in kept if s.stamp_ns <= stamp), key=lambda s: s.stamp_ns, default=None)
+        if newest is None:
+            return None
+        self._held[key] = [s for s in kept if s.stamp_ns >= newest.stamp_ns]
+        return newest if stamp - newest.stamp_ns <= 1e9 * self.inputs[key].held_s else None
 
     def _put(self, stamp: int, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         slots = self._pending.setdefault(stamp, {})
@@ -127,6 +145,8 @@ class Matcher:
             the cycles, and with which message each of them is complete.
         """
         heeded = columns.keys() - self._unheeded
+        if any(self._held.values()) or self._held.keys() & heeded:
+            return None
         if not self.exact or self._pending or not heeded or heeded != self.awaited or self._speaking != self.awaited:
             return None
         stamps = max((columns[key].stamp_ns for key in heeded), key=len)
@@ -218,6 +238,7 @@ class Matcher:
     def _begin_anew(self) -> None:
         self._pending.clear()
         self._latest.clear()
+        self._held = {key: [] for key in self._held}
         self._done = _NEVER
         self.set_back += 1
         self._component.configure()
@@ -233,7 +254,8 @@ class Matcher:
         for older in [s for s in self._pending if s < stamp]:
             self._give_up(older)
         self._done = stamp
-        return stamp, {key: slots.get(key) for key in self.inputs}
+        held = {key: self._held_at(key, stamp) for key in self._held}
+        return stamp, {key: slots.get(key) for key in self.inputs} | held
 
     def _longest_age(self, source: Input) -> int:
         """Age [ns] beyond which a message counts as silent: what comes less often may be older by what it waits."""
@@ -249,7 +271,8 @@ class Matcher:
         if key != self._pacing:
             return []
         self._done = stamp
-        return [(stamp, {name: sample if name == key else None for name in self.inputs})]
+        held = {name: self._held_at(name, stamp) for name in self._held}
+        return [(stamp, {name: sample if name == key else None for name in self.inputs} | held)]
 
     def _offer_latest(self, key: str, sample: Sample) -> list[tuple[int, dict[str, Sample | None]]]:
         self._latest[key] = sample
@@ -261,6 +284,9 @@ class Matcher:
             self._latest[key] = sample
         received = {}
         for name, entry in self.inputs.items():
+            if name in self._held:
+                received[name] = self._held_at(name, stamp)
+                continue
             held = self._latest.get(name)
             fresh = held is not None and abs(stamp - held.stamp_ns) <= self._longest_age(entry)
             if not fresh and not entry.may_be_silent:

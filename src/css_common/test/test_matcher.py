@@ -67,6 +67,42 @@ def offered(matcher: Matcher, *messages: tuple[str, float]) -> list[tuple[float,
 
 
 AB = (entry("a"), entry("b"))
+SLOW = replace(entry("t", required=False), held_s=1.0)
+"""A quantity that changes slowly and comes at times of its own."""
+
+
+def held(matcher: Matcher, *messages: tuple[str, float]) -> list[tuple[float, float | None]]:
+    """Steps of the cycles that some messages complete, with the step of the message that is held in each."""
+    cycles: list[tuple[float, float | None]] = []
+    for key, step in messages:
+        for stamp, received in matcher.offer(key, at(step)):
+            kept = received["t"]
+            cycles.append(((stamp - T0) / STEP, None if kept is None else (kept.stamp_ns - T0) / STEP))
+    return cycles
+
+
+@pytest.mark.parametrize("matching", ["exact", "latest"])
+def test_a_slow_input_is_held_and_not_waited_for(matching):
+    matcher = matcher_of((*AB, SLOW), io__input_matching=matching)
+    pair = [("b", 0.0), ("a", 0.0)]
+    assert held(matcher, *pair) == [(0.0, None)]
+    assert held(matcher, ("t", 0.5), ("t", 1.5), ("b", 1.0), ("a", 1.0)) == [(1.0, 0.5)]
+    assert held(matcher, ("b", 2.0), ("a", 2.0), ("b", 3.0), ("a", 3.0)) == [(2.0, 1.5), (3.0, 1.5)]
+    # older than it may be
+    assert held(matcher, ("b", 11.0), ("a", 11.0), ("b", 12.0), ("a", 12.0)) == [(11.0, 1.5), (12.0, None)]
+    assert matcher.unmatched == 0 and matcher.missing() == ["topic/a", "topic/b"]
+
+
+def test_stretches_without_a_slow_input_are_taken_at_once_and_others_message_by_message():
+    matcher = matcher_of((*AB, SLOW))
+    stamps = T0 + STEP * np.arange(3)
+    columns = {key: Columns(stamps) for key in "ab"}
+    places = {key: np.arange(3) * 2 + k for k, key in enumerate("ab")}
+    assert matcher.ordinary(columns, places) is not None
+    more = {"t": Columns(stamps[:1])}, {"t": np.array([6])}
+    assert matcher.ordinary(columns | more[0], places | more[1]) is None
+    held(matcher, ("t", -1.0))
+    assert matcher.ordinary(columns, places) is None
 
 
 @pytest.mark.parametrize("order", list(itertools.permutations("abc")))

@@ -6,18 +6,15 @@ from typing import Any
 import numpy as np
 
 from css_common.attitude import mrp_to_quaternion
-from css_common.codec import Sample
 from css_common.component import Input
 from css_common.kernel import typed_call
 from css_common.readings import Readings
 from css_common.schema import Values
-from css_common.vectors import Vec3, vector_of
 from css_estimation.attitude.attitude_solution import VALIDITY_NONE, AttitudeSolution
 from css_estimation.sun.error_covariance import FURTHER
 from css_estimation.sun.sun_heading import SunHeading
 from css_msgs.msg import CssVoltages, WheelState
 
-_NOTHING: Vec3 = (0.0, 0.0, 0.0)
 _to_quaternion = typed_call(mrp_to_quaternion)
 
 
@@ -62,23 +59,6 @@ def sun_estimate_fields(heading: SunHeading) -> dict[str, Any]:
         "mode": heading.mode,
         "sensors_left": heading.sensors_left,
     }
-
-
-def gyro_reading(imu: Sample | None) -> tuple[Vec3, bool]:
-    """Body rate [rad/s] of a sensor_msgs/Imu and whether it is a measurement.
-
-    A gyro that is switched off says so by the message's own convention, a first covariance element of -1.
-    """
-    if imu is None or imu.angular_velocity_covariance[0] == -1.0:
-        return _NOTHING, False
-    return vector_of(imu.angular_velocity), True
-
-
-def field_reading(field: Sample | None) -> tuple[Vec3, bool]:
-    """Field [T] of a sensor_msgs/MagneticField and whether it is a measurement, by the same convention."""
-    if field is None or field.magnetic_field_covariance[0] == -1.0:
-        return _NOTHING, False
-    return vector_of(field.magnetic_field), True
 
 
 def attitude_estimate_fields(solution: AttitudeSolution, covariance: np.ndarray) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import Sample, codec_of
 from css_estimation.attitude.flight_references import FlightReferences
-from css_estimation.messages import field_reading
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_msgs.msg import AttitudeEstimate, CssVoltages
 
@@ -128,7 +127,3 @@ def test_a_vector_cannot_calibrate_cells():
         values_of(sun_model="vector", calibration__mode="estimate")
     ))  # fmt: skip
     assert not list(AttitudeFilter.conflicts(values_of(calibration__mode="estimate")))
-
-
-def test_no_field_message_is_no_measurement():
-    assert field_reading(None) == ((0.0, 0.0, 0.0), False)

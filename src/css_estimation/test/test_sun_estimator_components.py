@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The components that the estimator nodes host: messages in, messages out, without a running graph."""
 
-import math
-
 import numpy as np
 import pytest
 from listing import components, executable, settings_of
@@ -10,7 +8,6 @@ from okeefe_spacecraft import okeefe_values
 from sensor_msgs.msg import Imu, MagneticField
 
 from css_common.codec import codec_of
-from css_estimation.messages import gyro_reading
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_estimation.sun.sun_heading import RATE_FIELD, RATE_GYRO, RATE_SUN
 from css_msgs.msg import CssVoltages, SunEstimate
@@ -165,12 +162,3 @@ def test_eclipse_by_the_orbit_model(kind, source, expected):
     component = build(kind, eclipse__source=source)
     assert run(component, 1, start=600)[0].eclipse == 0
     assert run(component, 1, start=27_000)[0].eclipse == expected
-
-
-def test_imu_convention():
-    assert gyro_reading(None) == ((0.0, 0.0, 0.0), False)
-    assert gyro_reading(imu(0, off=True)) == ((0.0, 0.0, 0.0), False)
-    rate, valid = gyro_reading(imu(0))
-    assert valid
-    assert rate == tuple(OMEGA.tolist())
-    assert all(math.isfinite(w) for w in rate)

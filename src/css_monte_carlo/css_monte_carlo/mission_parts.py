@@ -6,11 +6,11 @@ from typing import NamedTuple
 from css_analysis.configured_mission import is_attitude
 from css_common.component import Component
 from css_common.mission import Mission, MissionError, Node
-from css_estimation.calibrated_readings import is_calibrated
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_msgs.msg import SunEstimate
+from css_sensors.calibrated_readings import is_calibrated
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro

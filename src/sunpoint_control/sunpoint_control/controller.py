@@ -17,6 +17,7 @@ from css_common.sections import wheel_axes
 from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import ControlStatus, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand
+from css_sensors.calibrated_readings import CalibratedReadings
 from sunpoint_control.control_algorithm import ControlAlgorithm
 from sunpoint_control.control_output import ControlOutput, at_rest
 from sunpoint_control.held_field import NO_FIELD_MEASURED, HeldField
@@ -84,6 +85,7 @@ class Controller(Component):
         self._health = HealthReport(_what_was_done)
         self._step = typed_call(self.algorithm.step)
         self._last_stamp_ns: int | None = None
+        self._calibrated = CalibratedReadings(self.values)
         self._field = NO_FIELD_MEASURED
         self._field_stamp_ns: int | None = None
 
@@ -127,12 +129,11 @@ class Controller(Component):
 
     def _held_field(self, stamp_ns: int, received: Received) -> HeldField:
         """Last field measurement, for as long as the next may be on its way."""
-        field = received.get("field")
-        fresh = field is not None and bool(field.magnetic_field_covariance[0] != -1.0)
-        field_b = self._field.field_b
-        if field is not None and fresh:
-            field_b = vector_of(field.magnetic_field)
+        field_b, fresh = self._calibrated.field(received.get("field"))
+        if fresh:
             self._field_stamp_ns = stamp_ns
+        else:
+            field_b = self._field.field_b
         longest_ns = self.values.magnetometer.divider * self.period_ns
         valid = self._field_stamp_ns is not None and stamp_ns - self._field_stamp_ns < longest_ns
         self._field = HeldField(field_b, valid, fresh)

@@ -29,8 +29,11 @@ def field_at(stamp_ns, turned):
     )
 
 
-def cycles(control, first, count, turn=0.0, sun=True, every=4):
-    """Status and dipole of so many cycles, with a field that turns by an angle from one measurement to the next."""
+def cycles(control, first, count, turn=0.0, sun=True, every=4, reads=None):
+    """Status and dipole of so many cycles, with a field that turns by an angle from one measurement to the next.
+
+    `reads` is what the magnetometer makes of a field.
+    """
     out = []
     for k in range(first, first + count):
         stamp_ns = control.epoch_ns + k * control.period_ns
@@ -38,6 +41,8 @@ def cycles(control, first, count, turn=0.0, sun=True, every=4):
             stamp_ns, "bus", sun_b=np.array([0.6, 0.0, 0.8]), validity=SunEstimate.VALIDITY_VALID
         )
         field = field_at(stamp_ns, turn * k / every) if k % every == 0 else None
+        if field is not None and reads is not None:
+            field.magnetic_field = reads(field.magnetic_field)
         outgoing = control.cycle(stamp_ns, {"sun": estimate if sun else None, "field": field})
         out.append((outgoing["status"], outgoing["rods"].dipole.copy()))
     return out
@@ -74,6 +79,24 @@ def test_it_acquires_and_detumbles():
     fast = cycles(build(), 0, 13, turn=0.3)[-1]
     assert fast[0].mode == MODE_DETUMBLE
     assert np.any(fast[1])
+
+
+def test_it_hears_the_field_that_a_calibration_of_the_magnetometer_tells():
+    errors = (
+        "magnetometer.measured.bias_nt=2000.0,-3000.0,1000.0",
+        "magnetometer.measured.matrix=1.1,0.02,0.0,0.02,0.9,0.01,0.0,0.01,1.05",
+    )
+    matrix = np.array([[1.1, 0.02, 0.0], [0.02, 0.9, 0.01], [0.0, 0.01, 1.05]])
+
+    def wrong(field_b):
+        return matrix @ field_b + 1e-9 * np.array([2000.0, -3000.0, 1000.0])
+
+    plain, misled, corrected = (
+        cycles(build(*overrides), 0, 9, turn=0.05, reads=reads)[-1][1]
+        for overrides, reads in (((), None), ((), wrong), (errors, wrong))
+    )
+    assert corrected == pytest.approx(plain, rel=1e-9)
+    assert np.abs(misled - plain).max() > 0.01 * np.abs(plain).max()
 
 
 def test_without_an_estimate_a_fast_body_is_damped_all_the_same():

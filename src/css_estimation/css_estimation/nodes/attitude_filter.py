@@ -1,22 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Attitude and gyro bias from cells, magnetometer and gyro."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import ClassVar
 
-from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
 from css_common.declared import merged
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.attitude import attitude_ekf, attitude_options, flight_references
 from css_estimation.attitude.flight_references import FlightReferences
-from css_estimation.calibrated_readings import CalibratedReadings
-from css_estimation.messages import attitude_estimate_fields, cells_input, field_reading, gyro_reading
+from css_estimation.messages import attitude_estimate_fields, cells_input
 from css_msgs.msg import AttitudeEstimate
+from css_sensors.calibrated_readings import CalibratedReadings, temperature_findings, temperature_inputs
 
 
 class AttitudeFilter(Component):
@@ -30,6 +31,7 @@ class AttitudeFilter(Component):
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
         return (
             cells_input(values),
+            *temperature_inputs(values),
             gyro_input(values),
             field_input(values),
         )
@@ -47,6 +49,10 @@ class AttitudeFilter(Component):
         if values.calibration.mode != "off" and values.sun_model == "vector":
             yield f"calibration.mode: {values.calibration.mode} given, but sun_model vector calibrates no cells"
 
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return temperature_findings(node.values, graph)
+
     def configure(self) -> None:
         self._parameters = self.algorithm.parameters(self.values)
         self._state = self.algorithm.initial_state(self._parameters)
@@ -60,22 +66,25 @@ class AttitudeFilter(Component):
         super().tune(values)
         self._parameters = self.algorithm.parameters(values)
 
+    def standing(self) -> Standing:
+        return Standing(self._calibrated.warning)
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
-        gyro_b, gyro_valid = gyro_reading(received["gyro"])
-        field_b, field_valid = field_reading(received["field"])
+        gyro_b, gyro_valid = self._calibrated.rate(received["gyro"])
+        field_b, field_valid = self._calibrated.field(received["field"])
         self._state, solution = self._step(
             self._parameters,
             self._state,
             self._memory,
             since_ns / 1e9,
-            self._calibrated.cells(cells.voltages),
-            self._calibrated.rate(gyro_b) if gyro_valid else gyro_b,
+            self._calibrated.cells(cells.voltages, received.get("temperature")),
+            gyro_b,
             gyro_valid,
-            self._calibrated.field(field_b) if field_valid else field_b,
+            field_b,
             field_valid,
             self._references.at((stamp_ns - self.epoch_ns) * 1e-9),
             self._references.light,

@@ -1,21 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Attitude about all three axes from cells, gyro or wheels, and the orbit; no magnetometer."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from types import ModuleType
 from typing import ClassVar
 
-from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
-from css_estimation.calibrated_readings import CalibratedReadings
 from css_estimation.messages import attitude_estimate_fields
 from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.sun_estimator import aiding_of, inputs_of
 from css_estimation.sun_filter import earthlight
 from css_msgs.msg import AttitudeEstimate
+from css_sensors.calibrated_readings import CalibratedReadings, temperature_findings
 
 
 class Earthlight(Component):
@@ -41,6 +42,10 @@ class Earthlight(Component):
     def conflicts(cls, values: Values) -> Iterable[str]:
         return earthlight.conflicts(values)
 
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return temperature_findings(node.values, graph)
+
     def configure(self) -> None:
         self._parameters = earthlight.parameters(self.values)
         self._state = earthlight.initial_state(self._parameters)
@@ -54,6 +59,9 @@ class Earthlight(Component):
         super().tune(values)
         self._parameters = earthlight.parameters(values)
 
+    def standing(self) -> Standing:
+        return Standing(self._calibrated.warning)
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
         self._last_stamp_ns = stamp_ns
@@ -64,7 +72,7 @@ class Earthlight(Component):
             self._state,
             self._memory,
             since_ns / 1e9,
-            self._calibrated.cells(cells.voltages),
+            self._calibrated.cells(cells.voltages, received.get("temperature")),
             aiding_of(received, sky_at(self._sky, stamp_ns), self._calibrated),
         )
         fields = attitude_estimate_fields(solution, self._memory.covariance)

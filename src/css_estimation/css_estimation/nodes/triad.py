@@ -2,14 +2,15 @@
 """Attitude from the Sun, seen by the slits of a spinning body or by cells, and the magnetometer."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from css_common.attitude import dcm_to_quaternion
-from css_common.component import Component, Input, Outgoing, Output, Received
+from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
 from css_common.kernel import typed_call
+from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values, choice
 from css_common.sections import needed_of_orbit
@@ -18,9 +19,10 @@ from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.attitude import cell_sun, flight_references, sun_field_attitude
 from css_estimation.attitude.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN, SunFieldAttitude
-from css_estimation.messages import cells_input, field_reading
+from css_estimation.messages import cells_input
 from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
+from css_sensors.calibrated_readings import CalibratedReadings, temperature_findings, temperature_inputs
 
 _ORDERS = {"best": ORDER_BEST, "sun": ORDER_SUN, "field": ORDER_FIELD}
 _PRIMARY = choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; best: that with the smaller covariance")
@@ -65,8 +67,10 @@ class Triad(Component):
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
-        sun = cells_input(values) if _is_by_cells(values) else Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle)
-        return (sun, field_input(values, required=True))
+        field = field_input(values, required=True)
+        if _is_by_cells(values):
+            return (cells_input(values), *temperature_inputs(values), field)
+        return (Input("angle", "slit_sun_angle/sun_angle", SlitSunAngle), field)
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
@@ -86,6 +90,10 @@ class Triad(Component):
                 "spinning body is interpolated"
             )
 
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return temperature_findings(node.values, graph) if _is_by_cells(node.values) else ()
+
     def configure(self) -> None:
         self._environment = MissionEnvironment(
             self.values, field=True, field_degree=self.values[flight_references.FIELD_DEGREE]
@@ -96,6 +104,7 @@ class Triad(Component):
         self._sightings: deque[_Sighting] = deque(maxlen=64)
         self._newest: dict[str, Any] | None = None
         self._instant_ns = 0
+        self._calibrated = CalibratedReadings(self.values)
         self._cell_sun = cell_sun.CellSun(self.values) if _is_by_cells(self.values) else None
         self._attitude = typed_call(sun_field_attitude.sun_field_attitude)
         self._interpolated = typed_call(sun_field_attitude.interpolated_field)
@@ -109,6 +118,9 @@ class Triad(Component):
         attitude = self._attitude(x, isotropic(0.0), field_b, 1e-14, x, field_b, self._order)
         self._quaternion(attitude.dcm_bn)
 
+    def standing(self) -> Standing:
+        return Standing(self._calibrated.warning)
+
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         fresh = self._by_slits(stamp_ns, received) if self._cell_sun is None else self._by_cells(stamp_ns, received)
         return {"attitude": self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))}
@@ -117,11 +129,12 @@ class Triad(Component):
         """The attitude of a stamp at which field and cells tell one; True when they do."""
         cells, field = received["cells"], received["field"]
         assert cells is not None and self._cell_sun is not None  # required inputs
-        field_b, valid = field_reading(field)
+        field_b, valid = self._calibrated.field(field)
         if field is None or not valid:
             return False
         at = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
-        seen = self._cell_sun.seen(cells.voltages, field_b, at)
+        voltages = self._calibrated.cells(cells.voltages, received.get("temperature"))
+        seen = self._cell_sun.seen(voltages, field_b, at)
         if seen is None:
             return False
         # a covariance of zeros is one that nobody knows
@@ -133,7 +146,7 @@ class Triad(Component):
         angle = received["angle"]
         assert angle is not None  # a required input
         if received["field"] is not None:
-            field_b, valid = field_reading(received["field"])
+            field_b, valid = self._calibrated.field(received["field"])
             if valid:
                 variance = max(float(received["field"].magnetic_field_covariance[0]), 0.0)
                 self._samples.append(_FieldSample(stamp_ns, field_b, variance))

@@ -6,17 +6,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from css_common.component import Component, Cycles, Input, Outgoing, Output, Received, Smoothing
+from css_common.component import Component, Cycles, Finding, Input, Outgoing, Output, Received, Smoothing, Standing
 from css_common.declared import merged
 from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.message_columns import Columns
+from css_common.mission import Node
 from css_common.schema import Table, Values
 from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import field_input, gyro_input
-from css_estimation.calibrated_readings import CalibratedReadings
 from css_estimation.health import watched
-from css_estimation.messages import cells_input, field_reading, gyro_reading, sun_estimate_fields, wheels_input
+from css_estimation.messages import cells_input, sun_estimate_fields, wheels_input
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
 from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
 from css_estimation.sun.heading_dispatch import home_of
@@ -27,6 +27,7 @@ from css_estimation.sun.sun_algorithm import SunAlgorithm
 from css_estimation.sun.sun_heading import Aiding, Measured, Sky
 from css_estimation.sun.sun_tracking import RATE_CUTOFF, USE_GYRO
 from css_msgs.msg import SunEstimate
+from css_sensors.calibrated_readings import CalibratedReadings, temperature_findings, temperature_inputs
 
 _NO_SPEEDS = np.zeros(0)
 
@@ -43,7 +44,7 @@ def hears_wheels(values: Values) -> bool:
 
 def inputs_of(values: Values) -> tuple[Input, ...]:
     """Cells, and what else an algorithm with these values listens to."""
-    inputs = [cells_input(values)]
+    inputs = [cells_input(values), *temperature_inputs(values)]
     if USE_GYRO in values:
         inputs.append(gyro_input(values))
     if hears_field(values):
@@ -60,13 +61,13 @@ def _low_pass_gain(values: Values) -> float:
 
 def aiding_of(received: Received, sky: Sky, calibrated: CalibratedReadings) -> Aiding:
     """What an algorithm is given beside the cells, of the inputs of one stamp."""
-    gyro_b, gyro_valid = gyro_reading(received.get("gyro"))
-    field_b, field_valid = field_reading(received.get("field"))
+    gyro_b, gyro_valid = calibrated.rate(received.get("gyro"))
+    field_b, field_valid = calibrated.field(received.get("field"))
     wheels = received.get("wheels")
     return Aiding(
-        calibrated.rate(gyro_b) if gyro_valid else gyro_b,
+        gyro_b,
         gyro_valid,
-        calibrated.field(field_b) if field_valid else field_b,
+        field_b,
         field_valid,
         _NO_SPEEDS if wheels is None else wheels.speed,
         wheels is not None,
@@ -96,7 +97,7 @@ def measured_in(steps: Cycles, calibrated: CalibratedReadings) -> Measured | Non
 def _vectors(
     steps: Cycles, key: str, field: str, corrected: Callable[[np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The vectors (M, 3) of an input, zero where it measured none, and whether it did (M,); as `gyro_reading`."""
+    """The vectors (M, 3) of an input, zero where it measured none, and whether it did (M,); as one message."""
     given, variances = steps.spread(key, field), steps.spread(key, f"{field}_covariance")
     if given is None or variances is None:
         return np.zeros((len(steps.stamps_ns), 3)), np.zeros(len(steps.stamps_ns), np.bool_)
@@ -148,6 +149,10 @@ class SunEstimator(Component):
         rate_gain = getattr(cls.algorithm, "rate_gain", _low_pass_gain)
         return Smoothing(rate=rate_gain(values), heading=1.0 if heading_gain is None else heading_gain(values))
 
+    @classmethod
+    def preflight(cls, node: Node, graph: Mapping[str, Node]) -> Iterable[Finding]:
+        return temperature_findings(node.values, graph)
+
     def configure(self) -> None:
         self._parameters = watched.watched_parameters(self.algorithm, self.values)
         self._state = watched.initial_state(self.algorithm, self._parameters)
@@ -169,6 +174,9 @@ class SunEstimator(Component):
     def tune(self, values: Values) -> None:
         super().tune(values)
         self._parameters = watched.watched_parameters(self.algorithm, values)
+
+    def standing(self) -> Standing:
+        return Standing(self._calibrated.warning)
 
     def cycle_through(self, steps: Cycles) -> Mapping[str, Columns] | None:
         # here, as no node in flight needs it
@@ -207,7 +215,7 @@ class SunEstimator(Component):
             self._state,
             self._memory,
             since_ns / 1e9,
-            self._calibrated.cells(cells.voltages),
+            self._calibrated.cells(cells.voltages, received.get("temperature")),
             aiding,
         )
         self._tell(stamp_ns, heading.mode)
