@@ -115,6 +115,15 @@ LAUNCH_APOGEE = real(
     example="orbit: {launch: {apogee: 169.0e+3}}",
 )
 
+LATER_ELEMENTS = reals(
+    "orbit.later_elements",
+    (),
+    "-",
+    "further elements of the integrated model, a row each: seconds after the epoch from which on they hold, then "
+    "altitude [m], eccentricity, inclination, raan, argument of perigee and true anomaly [deg] at that instant",
+    columns=7,
+)
+
 ORBIT: Table = (
     ORBIT_SOURCE,
     ALTITUDE,
@@ -130,6 +139,7 @@ ORBIT: Table = (
         "elements that stand still or drift evenly, or motion from them integrated under J2, short periods included",
     ),
     flag("orbit.j2", False, "secular drift of node, perigee and anomaly by J2, of the secular model"),
+    LATER_ELEMENTS,
     text("orbit.tle_line1", "", "first line of the element set, when the source is tle"),
     text("orbit.tle_line2", "", "second line of the element set"),
     LAUNCH_LATITUDE,
@@ -477,8 +487,11 @@ def _orbit_conflicts(orbit: Values) -> Iterator[str]:
                 yield f"orbit.{key}: expected the 69 characters of a two-line element set"
     if orbit.model == "j2_integrated" and orbit.source in ("tle", "ballistic"):
         yield f"orbit.model: j2_integrated given with orbit.source {orbit.source}, expected elements as the source"
+    if len(orbit.later_elements) and (orbit.source != "elements" or orbit.model != "j2_integrated"):
+        yield "orbit.later_elements: given, expected elements as orbit.source and j2_integrated as orbit.model"
     if orbit.source != "elements":
         return
+    yield from _later_conflicts(orbit.later_elements)
     if orbit.altitude < _LOWEST:
         given = f"{orbit.altitude:g} given" if orbit.altitude else "missing"
         yield f"orbit.altitude: {given}, expected a number [m], at least {_LOWEST:g}, for instance 400.0e+3"
@@ -491,6 +504,22 @@ def _orbit_conflicts(orbit: Values) -> Iterator[str]:
             f"orbit.eccentricity: {orbit.eccentricity:g} given, which with orbit.altitude {orbit.altitude:g} m puts "
             f"the perigee at {perigee / 1e3:.0f} km; expected at most {most:.4f}, a perigee of {_LOWEST / 1e3:g} km"
         )
+
+
+def _later_conflicts(rows: np.ndarray) -> Iterator[str]:
+    """What is wrong with further elements (N, 7)."""
+    for number, (start, altitude, eccentricity, inclination, *angles) in enumerate(rows.tolist()):
+        before = rows[number - 1, 0] if number else 0.0
+        wrong = ""
+        if not start > before:
+            wrong = f"holds from {start:g} s on, expected a time after {before:g} s"
+        elif not (0.0 <= eccentricity <= 0.9 and 0.0 <= inclination <= 180.0 and all(abs(a) <= 360.0 for a in angles)):
+            wrong = "expected an eccentricity of 0 to 0.9, an inclination of 0 to 180 deg, angles of -360 to 360 deg"
+        elif not _LOWEST - 1e-3 <= (EARTH_RADIUS + altitude) * (1.0 - eccentricity) - EARTH_RADIUS <= 1e9:
+            wrong = f"altitude {altitude:g} m, expected a perigee of at least {_LOWEST / 1e3:g} km"
+        if wrong:
+            yield f"orbit.later_elements: row {number}: {wrong}"
+            return
 
 
 def _spacecraft_conflicts(spacecraft: Values) -> Iterator[str]:

@@ -1,10 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inputs that components of several packages have: body rate and magnetic field."""
 
-from sensor_msgs.msg import Imu, MagneticField
+from sensor_msgs.msg import Illuminance, Imu, MagneticField
 
 from css_common.component import Component, Input
 from css_common.schema import Values
+
+FULL_SUN_LUX = 133_100.0
+"""Illuminance of the Sun met head-on at 1 AU [lx], by the solar constant of illumination (Allen 2000, 14.9)."""
+
+FLAG_HELD_S = 120.0
+"""Time [s] for which what a spacecraft says of the shadow stands."""
+
+
+def sunlight_input() -> Input:
+    """Whether the spacecraft is in sunlight, by means of its own: 0 lx in the shadow."""
+    used = ("illuminance",)
+    return Input("sunlight", "sunlight/illuminance", Illuminance, required=False, used=used, held_s=FLAG_HELD_S)
 
 
 def uses_gyro(component: type[Component]) -> bool:

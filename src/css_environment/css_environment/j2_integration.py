@@ -63,29 +63,29 @@ def _stepped(motion: _Motion, h: float) -> _Motion:
 
 
 @kernel
-def _marched(motion: _Motion, steps: int) -> _Motion:
+def _marched(motion: _Motion, steps: int, step_s: float) -> _Motion:
     for _ in range(steps):
-        motion = _stepped(motion, STEP_S)
+        motion = _stepped(motion, step_s)
     return motion
 
 
 @outer_kernel
-def _follow(r_n: Vec3, v_n: Vec3, elapsed_s, r_out, v_out) -> None:
-    """States (T, 3) each at (T,) times [s] after one, which grow; whole steps from it, then the rest.
+def _follow(r_n: Vec3, v_n: Vec3, step_s: float, elapsed_s, r_out, v_out) -> None:
+    """States (T, 3) each at (T,) times [s] after one, which grow; whole steps [s] from it, then the rest.
 
     Times before it are reached backward, each for itself.
     """
     here, steps = (r_n, v_n), 0
     for i in range(elapsed_s.shape[0]):
         if elapsed_s[i] < 0.0:
-            back = int(np.ceil(-elapsed_s[i] / STEP_S))
+            back = int(np.ceil(-elapsed_s[i] / step_s))
             motion = (r_n, v_n)
             for _ in range(back):
                 motion = _stepped(motion, elapsed_s[i] / back)
         else:
-            whole = int(np.floor(elapsed_s[i] / STEP_S))
-            here, steps = _marched(here, whole - steps), whole
-            rest = elapsed_s[i] - whole * STEP_S
+            whole = int(np.floor(elapsed_s[i] / step_s))
+            here, steps = _marched(here, whole - steps, step_s), whole
+            rest = elapsed_s[i] - whole * step_s
             motion = _stepped(here, rest) if rest > 0.0 else here
         for j in range(3):
             r_out[i, j], v_out[i, j] = motion[0][j], motion[1][j]
@@ -97,7 +97,9 @@ class J2Track:
     A state at an instant is the same whatever was asked for before.
     """
 
-    def __init__(self, r_n: np.ndarray, v_n: np.ndarray) -> None:
+    def __init__(self, r_n: np.ndarray, v_n: np.ndarray, step_s: float = STEP_S) -> None:
+        """Begins there; longer steps [s] are faster: of 8 s a week at 400 km ends within 5 m."""
+        self._step_s = step_s
         self._legs: list[_Motion] = [(_vector(r_n), _vector(v_n))]
         self._march, self._follow = typed_call(_marched), typed_call(_follow)
         self._lock = threading.Lock()
@@ -105,20 +107,20 @@ class J2Track:
     def states(self, elapsed_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Position and velocity in n, (T, 3) each, at (T,) seconds in any order."""
         r_n, v_n = np.zeros((len(elapsed_s), 3)), np.zeros((len(elapsed_s), 3))
-        leg_s = LEG_STEPS * STEP_S
+        leg_s = LEG_STEPS * self._step_s
         legs = np.maximum(np.floor(elapsed_s / leg_s), 0.0).astype(int)
         for leg in np.unique(legs):
             rows = np.flatnonzero(legs == leg)
             rows = rows[np.argsort(elapsed_s[rows], kind="stable")]
             r, v = np.zeros((len(rows), 3)), np.zeros((len(rows), 3))
-            self._follow(*self._at_leg(int(leg)), elapsed_s[rows] - leg * leg_s, r, v)
+            self._follow(*self._at_leg(int(leg)), self._step_s, elapsed_s[rows] - leg * leg_s, r, v)
             r_n[rows], v_n[rows] = r, v
         return r_n, v_n
 
     def _at_leg(self, leg: int) -> _Motion:
         with self._lock:
             while len(self._legs) <= leg:
-                self._legs.append(self._march(self._legs[-1], LEG_STEPS))
+                self._legs.append(self._march(self._legs[-1], LEG_STEPS, self._step_s))
             return self._legs[leg]
 
 

@@ -23,7 +23,7 @@ from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS
 from css_environment.ephemeris import EnvironmentState, Ephemeris
 from css_environment.magnetic_field import HIGHEST_DEGREE
-from css_environment.orbit import IntegratedOrbit, Orbit, TleOrbit, keplerian_orbit
+from css_environment.orbit import ArcsOrbit, IntegratedOrbit, Orbit, TleOrbit, keplerian_orbit
 
 # Half a second of work that a node's rehearsal and its flight, or the flights of one process, share.
 _segment_tables = lru_cache(maxsize=4)(ephemeris.build_ephemeris)
@@ -62,7 +62,13 @@ def mission_orbit(values: Values) -> Orbit:
         o.true_anomaly_deg,
         o.j2,
     )
-    return IntegratedOrbit(elements) if o.model == "j2_integrated" else elements
+    if o.model != "j2_integrated":
+        return elements
+    first = IntegratedOrbit(elements)
+    if not len(o.later_elements):
+        return first
+    later = [IntegratedOrbit(keplerian_orbit(EARTH_RADIUS + row[1], *row[2:].tolist())) for row in o.later_elements]
+    return ArcsOrbit((0.0, *o.later_elements[:, 0].tolist()), (first, *later))
 
 
 class MissionEnvironment:

@@ -41,7 +41,14 @@ class IntegratedOrbit(NamedTuple):
     elements: KeplerianOrbit  # of the two-body orbit that has the same position and velocity at the epoch
 
 
-Orbit = KeplerianOrbit | IntegratedOrbit | TleOrbit
+class ArcsOrbit(NamedTuple):
+    """One integrated orbit after the other; the first holds before its time as well."""
+
+    starts_s: tuple[float, ...]  # after the epoch, growing: when each begins to hold, and its elements are osculating
+    arcs: tuple[IntegratedOrbit, ...]
+
+
+Orbit = KeplerianOrbit | IntegratedOrbit | TleOrbit | ArcsOrbit
 
 
 def keplerian_orbit(
@@ -75,9 +82,20 @@ def orbit_states(orbit: Orbit, epoch_ns: int, elapsed_s) -> tuple[np.ndarray, np
     elapsed_s = np.atleast_1d(np.asarray(elapsed_s, dtype=float))
     if isinstance(orbit, TleOrbit):
         return _tle_states(orbit, epoch_ns, elapsed_s)
+    if isinstance(orbit, ArcsOrbit):
+        return _arcs_states(orbit, epoch_ns, elapsed_s)
     if isinstance(orbit, IntegratedOrbit):
         return _track(orbit).states(elapsed_s)
     return _keplerian_states(orbit, elapsed_s)
+
+
+def _arcs_states(orbit: ArcsOrbit, epoch_ns: int, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    r_n, v_n = np.empty((len(t), 3)), np.empty((len(t), 3))
+    which = np.maximum(np.searchsorted(orbit.starts_s, t, side="right") - 1, 0)
+    for k in np.unique(which).tolist():
+        rows = which == k
+        r_n[rows], v_n[rows] = orbit_states(orbit.arcs[k], epoch_ns, t[rows] - orbit.starts_s[k])
+    return r_n, v_n
 
 
 @lru_cache(maxsize=16)

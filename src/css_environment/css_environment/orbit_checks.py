@@ -13,7 +13,7 @@ from css_environment.ballistic import geodetic_heights
 from css_environment.constants import EARTH_RADIUS
 from css_environment.magnetic_field import LAST_YEAR
 from css_environment.mission_environment import mission_orbit
-from css_environment.orbit import IntegratedOrbit, KeplerianOrbit, TleOrbit, orbit_states
+from css_environment.orbit import ArcsOrbit, IntegratedOrbit, KeplerianOrbit, TleOrbit, orbit_states
 from css_environment.tle_checks import tle_findings
 
 LONGEST_EXTRAPOLATION = 5
@@ -37,6 +37,8 @@ def orbit_findings(values: Values) -> Iterator[Finding]:
     except ValueError as error:
         yield Finding(f"orbit.launch.apogee: {error}, expected one that an arc from there reaches", refused=True)
         return
+    if isinstance(orbit, ArcsOrbit):
+        orbit = orbit.arcs[0]
     if isinstance(orbit, IntegratedOrbit):
         orbit = orbit.elements
     if isinstance(orbit, TleOrbit):

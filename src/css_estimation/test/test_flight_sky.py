@@ -5,8 +5,12 @@ import numpy as np
 import pytest
 from okeefe_spacecraft import okeefe_values
 from presence import present
+from sensor_msgs.msg import Illuminance
 
+from css_common.codec import codec_of
+from css_common.component import Cycles
 from css_common.epochs import parse_utc
+from css_common.sensor_inputs import FULL_SUN_LUX
 from css_environment.earth_light import DISC, DISC_LIGHT
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.nodes.ekf import Ekf
@@ -18,6 +22,7 @@ from css_estimation.sun.sun_heading import (
     PREDICTION_UNKNOWN,
     UNKNOWN_SKY,
 )
+from css_msgs.msg import CssVoltages
 
 NOON_S, NIGHT_S = 600.0, 4000.0
 
@@ -67,3 +72,19 @@ def test_an_estimator_that_knows_no_earth_may_ask_for_the_shadow_alone():
     given = values(Ekf, eclipse__source="both")
     sky = present(flight_sky(given)).at(stamp(given, NIGHT_S))
     assert sky.predicted == PREDICTION_ECLIPSED and not np.any(sky.light)
+
+
+def test_a_flag_of_the_spacecraft_has_the_word_on_the_shadow_and_without_it_the_cells_have():
+    """Bright cells in a shadow that the spacecraft reports, without any orbit."""
+    given = values(Ekf, eclipse__source="flag", use_gyro=False, health__enabled=False)
+    (heard,) = (i for i in Ekf.inputs("ekf", given) if i.key == "sunlight")
+    assert heard.topic == "sunlight/illuminance" and heard.held_s > 0.0 and not heard.required
+    component = Ekf("ekf", given)
+    told = []
+    for k, lux in enumerate((None, FULL_SUN_LUX, 0.0, 0.4 * FULL_SUN_LUX, None)):
+        stamp_ns = component.epoch_ns + k * component.period_ns
+        cells = codec_of(CssVoltages).sample(stamp_ns, "bus", voltages=np.full(8, 0.5))
+        flag = None if lux is None else codec_of(Illuminance).sample(stamp_ns, "bus", illuminance=lux)
+        told.append(component.cycle(stamp_ns, {"cells": cells, "sunlight": flag})["estimate"].eclipse)
+    assert told == [0, 0, 1, 1, 0]
+    assert component.cycle_through(Cycles(np.array([0]), {}, {})) is None

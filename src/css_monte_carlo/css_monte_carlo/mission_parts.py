@@ -8,6 +8,7 @@ from css_common.component import Component
 from css_common.mission import Mission, MissionError, Node
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
+from css_estimation.sun.flight_sky import hears_flag
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_msgs.msg import SunEstimate
 from css_sensors.calibrated_readings import is_calibrated
@@ -53,6 +54,8 @@ def parts_of(mission: Mission, estimator: str | None = None) -> Parts:
     for listed in mission.nodes:
         if is_calibrated(listed.values):
             raise _no_place(mission, f"the compiled loop has no place for the calibration of {listed.name}")
+        if hears_flag(listed.values):
+            raise _no_place(mission, f"the compiled loop has no place for the eclipse flag of {listed.name}")
     control = _part(mission, Controller)
     parts = Parts(
         plant=_needed(mission, Dynamics),

@@ -61,6 +61,8 @@ def groups_of(description: Description) -> list[Group]:
         ]
         groups += _position_groups("position", aiding.position)
         temperatures += [form.column for form in aiding.temperatures]
+        if aiding.illumination is not None:
+            groups.append(Group("flag of sunlight", (aiding.illumination.column,)))
     if truth is not None:
         groups += [
             Group(what, form.columns)

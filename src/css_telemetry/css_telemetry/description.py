@@ -21,6 +21,7 @@ class TableForm(NamedTuple):
     units_row: bool | None = None
     long_name: str = ""  # column that names what stands in a line, of tables with one value a line
     long_value: str = ""
+    absent: tuple[str, ...] = ()  # names of the header that have no field in the lines
 
 
 PLAIN = TableForm()
@@ -111,6 +112,8 @@ class Aiding(NamedTuple):
     position: PositionForm | None = None
     wheels: WheelForm | None = None
     temperatures: tuple[ColumnForm, ...] = ()
+    illumination: ColumnForm | None = None  # part of the sunlight that the spacecraft says it is in
+    eclipse: bool = False  # that column is 1 in the shadow
 
 
 class Truth(NamedTuple):

@@ -186,7 +186,7 @@ def _view(entry: Entry | None) -> float | None:
 
 
 def _table(entry: Entry) -> TableForm:
-    keys = entry.children(("separator", "decimal", "encoding", "sheet", "units_row", "long"))
+    keys = entry.children(("separator", "decimal", "encoding", "sheet", "units_row", "long", "absent"))
     given: dict[str, Any] = {}
     if (separator := keys.get("separator")) is not None:
         mark = separator.value if separator.value in SEPARATORS else _WORDS_OF_SEPARATORS.get(str(separator.value))
@@ -204,6 +204,8 @@ def _table(entry: Entry) -> TableForm:
     if (long := keys.get("long")) is not None:
         names = long.children(("name", "value"))
         given["long_name"], given["long_value"] = names["name"].word(), names["value"].word()
+    if (absent := keys.get("absent")) is not None:
+        given["absent"] = absent.words()
     return TableForm(**given)
 
 

@@ -5,7 +5,7 @@ import re
 
 from css_telemetry.description import Aiding, Description, TimeForm, Truth, VectorForm
 from css_telemetry.table_text import Table, name_and_unit
-from css_telemetry.units import RATES, TIME_UNITS, plain_unit
+from css_telemetry.units import RATES, TIME_UNITS, plain_unit, unit_of_our_days
 from css_telemetry.values import is_number
 
 TIME_NAMES = ("time", "timestamp")
@@ -55,6 +55,12 @@ def column_of(table: Table, name: str) -> int | None:
     return found[0] if found else None
 
 
+def is_read_by_name(name: str) -> bool:
+    """Whether a column of this name is read where no description says what it is."""
+    plain = plain_name(name_and_unit(name)[0])
+    return plain in (*TIME_NAMES, *SUN_NAMES) or bool(_RATE.fullmatch(plain) or _RATE.fullmatch(plain_name(name)))
+
+
 def _check_header(table: Table) -> None:
     """Raises ValueError when the first line names no columns, or one twice."""
     header = table.header
@@ -92,7 +98,11 @@ def completed(
         name = table.header[index]
         if plain_name(name_and_unit(name)[0]) != TIME_NAMES[0]:
             notes.append(f"time from the column {name}")
-        time = TimeForm((name,), time_unit or _unit_of_time(table, index))
+        unit = time_unit or _unit_of_time(table, index)
+        if unit is None:
+            unit, guessed = _guessed_unit(table, index) if epoch_ns is None else ("s", "")
+            notes += [guessed] if guessed else []
+        time = TimeForm((name,), unit)
     elif time_unit is not None:
         time = time._replace(unit=time_unit)
     if epoch_ns is not None:
@@ -124,9 +134,22 @@ def _time_column(table: Table, others: list[int]) -> int:
     )
 
 
-def _unit_of_time(table: Table, index: int) -> str:
+def _guessed_unit(table: Table, index: int) -> tuple[str, str]:
+    """Unit of times of which nothing is told, by the first of them, and what to say of it."""
+    first = next((text for block in table.blocks() for text in block.columns[index] if str(text)), "")
+    text = str(first).replace(",", ".") if table.decimal_comma else str(first)
+    unit = unit_of_our_days(float(text)) if is_number(text) else None
+    if unit in (None, "s"):
+        return "s", ""
+    return unit, f"times in {unit}, a guess: {text} {unit} since 1970 is a time of our days (--time-unit tells it)"
+
+
+def _unit_of_time(table: Table, index: int) -> str | None:
+    """Unit that a header tells; None: it tells none."""
     unit = plain_unit(table.units[index])
-    if unit.lower() in ("", "utc", "iso", "iso 8601", "iso8601"):
+    if not unit:
+        return None
+    if unit.lower() in ("utc", "iso", "iso 8601", "iso8601"):
         return "s"
     if unit not in TIME_UNITS:
         raise ValueError(

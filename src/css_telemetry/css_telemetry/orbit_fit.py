@@ -13,13 +13,12 @@ from css_telemetry.places import Place
 WORST_M = 20e3
 """Distance [m] of a position from the fitted orbit beyond which it is none: 0.15 deg, 3 s of a low orbit."""
 
-LONGEST_S = 7 * 86_400.0
-"""Span [s] over which one set of elements is tried: later, drag and the Moon have moved the spacecraft."""
-
 _FIRST_SPAN_S = 3_000.0  # half of an orbit, from which on a fit is carried to longer spans
 _SPANS_GROW = 8.0
 
 _MOST_POINTS = 300
+_STEP_S = 8.0  # of integration: 5 m in a week at 400 km
+_SLOPE = 0.01  # of 1 km and 1 m/s: far above what rounding makes of a week, far below what bends
 _BEGINNING_S = 120.0  # of positions by which a first velocity is found
 _LOWEST = 100e3  # altitude [m] that missions accept
 
@@ -57,9 +56,6 @@ def fit_orbit(place: Place, stamps_ns: np.ndarray) -> OrbitFit:
     if len(known) < 3:
         raise ValueError(f"{len(known)} positions are known, expected at least 3")
     elapsed = (stamps_ns - stamps_ns[0]) * 1e-9
-    if elapsed[known[-1]] - elapsed[0] > LONGEST_S:
-        span = (elapsed[known[-1]] - elapsed[0]) / 86_400.0
-        raise ValueError(f"they span {span:.1f} days, one set of elements holds for {LONGEST_S / 86_400.0:g}")
     state = _first_state(place, elapsed, known)
     span, longest = elapsed[known[0]] + _FIRST_SPAN_S, float(elapsed[known[-1]])
     while span < longest:
@@ -90,11 +86,16 @@ def _improved(
 
     def misses(x: np.ndarray) -> np.ndarray:
         state = start + scale * x
-        track, _ = J2Track(state[:3], state[3:]).states(time)
+        track, _ = J2Track(state[:3], state[3:], _STEP_S).states(time)
         miss = (track - positions) / 1e3
         return np.where(np.isfinite(miss), np.clip(miss, -1e6, 1e6), 1e6).ravel()
 
-    found = least_squares(misses, np.zeros(6), method="trf", x_scale="jac", max_nfev=40)
+    def slopes(x: np.ndarray) -> np.ndarray:
+        here = misses(x)
+        return np.stack([(misses(x + step) - here) / _SLOPE for step in _SLOPE * np.eye(6)], axis=1)
+
+    # a tolerance of a metre in positions of thousands of kilometres
+    found = least_squares(misses, np.zeros(6), jac=slopes, method="trf", x_scale="jac", max_nfev=40, ftol=1e-6)
     return start + scale * found.x, 1e3 * found.fun.reshape(-1, 3)
 
 

@@ -2,8 +2,9 @@
 """Writes telemetry into a recording that replays like one of Sunpoint's own.
 
 Topics: `css/voltages`; `gyro/imu`, `mag/field`, `wheels/state`, `css/temperature` (further ones on `temperature/NAME`)
-where the table has them; `truth` where it has the Sun vector or the attitude. The mission inside holds what the
-description tells of the spacecraft and its orbit, and nothing else.
+where the table has them; `sunlight/illuminance` by a flag of the shadow that is aiding; `truth` where it has the Sun
+vector or the attitude. The mission inside holds what the description tells of the spacecraft and its orbit, what a
+calibration tells of its sensors, and nothing else.
 """
 
 import json
@@ -13,13 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from sensor_msgs.msg import Imu, MagneticField, Temperature
+from sensor_msgs.msg import Illuminance, Imu, MagneticField, Temperature
 
 from css_common.codec import codec_of
 from css_common.epochs import format_utc
 from css_common.mission_file import dump_sections
 from css_common.progress_lines import ProgressLines
 from css_common.sections import name_for_files
+from css_common.sensor_inputs import FULL_SUN_LUX
 from css_msgs.msg import CssVoltages, SpacecraftState, WheelState
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
@@ -34,6 +36,7 @@ VOLTAGES = Topic("/css/voltages", "css_msgs/msg/CssVoltages")
 IMU = Topic("/gyro/imu", "sensor_msgs/msg/Imu")
 FIELD = Topic("/mag/field", "sensor_msgs/msg/MagneticField")
 WHEELS = Topic("/wheels/state", "css_msgs/msg/WheelState")
+SUNLIGHT = Topic("/sunlight/illuminance", "sensor_msgs/msg/Illuminance")
 TEMPERATURE = "/css/temperature"
 TRUTH = Topic("/truth", "css_msgs/msg/SpacecraftState")
 SHORTEST_PERIOD_S, LONGEST_PERIOD_S = 0.001, 60.0
@@ -44,11 +47,9 @@ _NO_ESTIMATE = -1.0  # first element of a covariance: the quantity is not measur
 def write_recording(
     telemetry: Telemetry,
     states: TrueStates | None,
-    orbit: Mapping[str, Any],
+    mission: str,
     source: Path,
     folder: Path,
-    period_s: float,
-    largest_step_s: float,
     *,
     overwrite: bool = False,
 ) -> dict[str, int]:
@@ -57,10 +58,9 @@ def write_recording(
     Args:
         telemetry: what was read of `source`.
         states: its truth.
-        orbit: entries of the section `orbit` of the mission; empty: it is not known.
+        mission: text of the mission that it holds.
         source: file it came from, kept by name and hash.
         folder: the recording.
-        period_s, largest_step_s: usual and largest step of time.
         overwrite: replace a recording that is there.
 
     Raises:
@@ -68,10 +68,10 @@ def write_recording(
     """
     topics = [TRUTH] * (states is not None) + [VOLTAGES] + [IMU] * (telemetry.rate is not None)
     topics += [FIELD] * (telemetry.field is not None) + [WHEELS] * (telemetry.wheels is not None)
-    topics += _temperature_topics(telemetry).values()
+    topics += [SUNLIGHT] * (telemetry.sunlight is not None) + [*_temperature_topics(telemetry).values()]
     origin = {"file": source.name, "sha256": telemetry.sha256, "truth": list(states.known) if states else []}
     metadata = {
-        "mission": mission_text(telemetry, orbit, source.stem, period_s, largest_step_s),
+        "mission": mission,
         IMPORTED_FROM: json.dumps(origin),
         **software_versions(),
     }
@@ -94,7 +94,14 @@ def write_recording(
 def mission_text(
     telemetry: Telemetry, orbit: Mapping[str, Any], name: str, period_s: float, largest_step_s: float
 ) -> str:
-    """Mission file for replaying the telemetry; what it does not know keeps its default, which is nobody's."""
+    """Mission file for replaying the telemetry; what it does not know keeps its default, which is nobody's.
+
+    Args:
+        telemetry: what was read.
+        orbit: entries of the section `orbit` of the mission; empty: it is not known.
+        name: of the mission.
+        period_s, largest_step_s: usual and largest step of time.
+    """
     description, stamps = telemetry.description, telemetry.stamps_ns
     period_s = min(max(period_s, SHORTEST_PERIOD_S), LONGEST_PERIOD_S)
     entries: dict[str, Any] = {
@@ -168,6 +175,10 @@ def _measured(telemetry: Telemetry, row: int, stamp_ns: int, blind: bool) -> Ite
         codec = codec_of(WheelState)
         speed = telemetry.wheels[row]
         yield WHEELS, codec.encode(codec.sample(stamp_ns, BODY_FRAME, speed=speed, torque=np.zeros(len(speed))))
+    if telemetry.sunlight is not None and np.isfinite(telemetry.sunlight[row]):
+        codec = codec_of(Illuminance)
+        lux = FULL_SUN_LUX * float(telemetry.sunlight[row])
+        yield SUNLIGHT, codec.encode(codec.sample(stamp_ns, BODY_FRAME, illuminance=lux))
     for name, topic in _temperature_topics(telemetry).items() if telemetry.temperatures else ():
         values = telemetry.temperatures[name]
         if np.isfinite(values[row]):

@@ -48,6 +48,7 @@ def aiding_of(entry: Entry) -> Aiding:
         given["wheels"] = _wheels(wheels)
     if (temperatures := keys.get("temperatures")) is not None:
         given["temperatures"] = tuple(_temperature(item) for item in temperatures.items())
+    given |= _light(entry, keys)
     return Aiding(**given)
 
 
@@ -67,15 +68,21 @@ def truth_of(entry: Entry) -> Truth:
         given["rate"] = _vector(rate, RATES)
     if (position := keys.get("position")) is not None:
         given["position"] = _position(position)
+    given |= _light(entry, keys)
+    if "sun_inertial" in given and "attitude" not in given:
+        raise ValueError(f"{entry.name}.sun_inertial: given without attitude, expected both: it is a direction in n")
+    return Truth(**given)
+
+
+def _light(entry: Entry, keys: Children) -> dict[str, Any]:
+    """The column that tells sunlight or shadow, if there is one."""
     if "eclipse" in keys and "illumination" in keys:
         raise ValueError(f"{entry.name}: eclipse and illumination given, expected one of them")
     for name in ("eclipse", "illumination"):
         if (column := keys.get(name)) is not None:
-            given["illumination"] = ColumnForm(column.children(("column",))["column"].word())
-            given["eclipse"] = name == "eclipse"
-    if "sun_inertial" in given and "attitude" not in given:
-        raise ValueError(f"{entry.name}.sun_inertial: given without attitude, expected both: it is a direction in n")
-    return Truth(**given)
+            form = ColumnForm(column.children(("column",))["column"].word())
+            return {"illumination": form, "eclipse": name == "eclipse"}
+    return {}
 
 
 def _factor(keys: Children, key: str, units: Mapping[str, float]) -> float:

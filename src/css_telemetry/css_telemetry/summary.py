@@ -38,12 +38,18 @@ def summary_lines(report: ImportReport) -> Iterator[str]:
         )
     if report.gaps:
         yield f"gaps in time: {report.gaps}, the longest {report.longest_gap_s:g} s"
+    if telemetry.doubt:
+        yield f"a guess: {telemetry.doubt}"
     if telemetry.read_as:
         yield f"read as: {', '.join(telemetry.read_as)}"
     if not telemetry.description.views_known:
         yield f"field of view of the cells: not told, taken for {USUAL_VIEW_DEG:g} deg (field_of_view_deg tells it)"
     yield from _truth_lines(report)
     yield from report.orbit_notes
+    if telemetry.sunlight is not None:
+        yield "flag of the shadow: heard by estimators with eclipse.source flag (--estimators ekf:eclipse.source=flag)"
+    if report.calibration is not None:
+        yield f"calibration: {report.calibration}, taken off by whoever replays the recording; its cells are as read"
     if telemetry.ignored_columns:
         yield f"columns not used: {', '.join(telemetry.ignored_columns)}"
         yield from (f"  {likeness}" for likeness in likenesses(telemetry.ignored_columns))
@@ -106,6 +112,7 @@ def summary_object(report: ImportReport) -> dict[str, Any]:
             for value, found in account.fills.items()
         ],
         "read_as": list(telemetry.read_as),
+        "guessed_form": telemetry.doubt,
         "columns_not_used": list(telemetry.ignored_columns),
         "largest_output": telemetry.largest_output,
         "truth": list(report.states.known) if report.states is not None else [],
@@ -113,5 +120,6 @@ def summary_object(report: ImportReport) -> dict[str, Any]:
         "dates_known": telemetry.description.dates_known,
         "field_of_view_deg": telemetry.description.field_of_view_deg,
         "orbit": report.orbit or None,
+        "calibration": None if report.calibration is None else str(report.calibration),
         "notes": report.orbit_notes,
     }

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Opens a table, whatever kind of file it is in: text, Parquet or Excel."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,12 @@ _BLOCK = 100_000
 
 
 def open_table(
-    path: Path, content: bytes, names: Collection[str], form: TableForm = PLAIN, times: tuple[str, ...] = ()
+    path: Path,
+    content: bytes,
+    names: Collection[str],
+    form: TableForm = PLAIN,
+    times: tuple[str, ...] = (),
+    is_used: Callable[[str], bool] | None = None,
 ) -> Table:
     """The table in a file.
 
@@ -31,6 +36,7 @@ def open_table(
         content: of the file.
         names: columns that are expected.
         form: what is known of it.
+        is_used: whether a column of some name is; None: nobody knows yet.
         times: columns of the time, by which lines of a table with one value a line belong together.
 
     Raises:
@@ -43,7 +49,7 @@ def open_table(
         frame, sheet = _excel(path, content, form.sheet)
         table = _framed(path, frame, 1, [f"Excel, sheet {sheet}"])
     else:
-        table = text_table(path, content, names, form)
+        table = text_table(path, content, names, form, is_used)
     return pivoted(table, form, times) if form.long_name else table
 
 

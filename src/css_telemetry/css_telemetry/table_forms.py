@@ -30,7 +30,8 @@ YAML:
     unit: counts                       # V, mV, uV, A, mA, uA, counts or 1, for the summary
     missing: [-9999, 65535]            # numbers that stand for missing values, instead of those found
     table: {separator: ";", decimal: ",", encoding: latin-1, sheet: Telemetry, units_row: true,
-            long: {name: sensor, value: reading}}                   # long: one value a line
+            long: {name: sensor, value: reading},                   # long: one value a line
+            absent: [temp]}            # names in the header without a field in the lines below
     time: {column: t, unit: ms, scale: gps}  # or columns: [date, time], [week, seconds] of GPS
                                        # unit: s ms us ns min h d; scale: utc unix gps tai epoch boot;
                                        # epoch: 2024-03-20T12:00:00Z, from which counts count
@@ -42,6 +43,7 @@ YAML:
                                        # or {tle: [LINE1, LINE2]}
       wheels: {columns: [w1], unit: rpm, axes: [[0, 0, 1]], inertia: 0.001}
       temperatures: [{column: T2, unit: degC}]
+      eclipse: {column: dark}          # 1 in the shadow, or illumination: for estimators with eclipse.source flag
     truth:                             # what estimates are held against
       sun: {columns: [sx, sy, sz]}     # in the body frame, of any length
       attitude: {columns: [q1, q2, q3, q4], order: xyzw, direction: inertial_to_body}

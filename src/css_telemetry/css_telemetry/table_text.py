@@ -54,6 +54,7 @@ class Table(NamedTuple):
     decimal_comma: bool
     read_as: tuple[str, ...]  # what is not a UTF-8 text with commas and decimal points
     blocks: Callable[[], Iterator[Block]]
+    doubt: str = ""  # what of the form had to be guessed against what stands there
 
 
 def name_and_unit(column: str) -> tuple[str, str]:
@@ -62,7 +63,13 @@ def name_and_unit(column: str) -> tuple[str, str]:
     return (column[: found.start()].strip(), found.group(1).strip()) if found else (column, "")
 
 
-def text_table(path: Path, content: bytes, names: Collection[str], form: TableForm = PLAIN) -> Table:
+def text_table(
+    path: Path,
+    content: bytes,
+    names: Collection[str],
+    form: TableForm = PLAIN,
+    is_used: Callable[[str], bool] | None = None,
+) -> Table:
     """The table of a text.
 
     Args:
@@ -70,9 +77,10 @@ def text_table(path: Path, content: bytes, names: Collection[str], form: TableFo
         content: of the file.
         names: columns that are expected, by which the separator is found.
         form: what is known of it.
+        is_used: whether a column of some name is; None: nobody knows yet.
 
     Raises:
-        BagError: the content is no text, or has no header.
+        BagError: the content is no text, has no header, or names that are not those of its fields.
     """
     text, encoding = _decoded(path, content, form.encoding)
     first = list(islice(_numbered(text), _LOOKED_AT))
@@ -83,6 +91,7 @@ def text_table(path: Path, content: bytes, names: Collection[str], form: TableFo
     header = _split(header_text, separator)
     if header is None:
         raise BagError(f"{path}: line {header_line}: the header cannot be taken apart: a quotation mark is left open")
+    header, doubt = _fitting(path, header, first, separator, form.absent, is_used)
     fields = [field for _, line in first[1:] for field in _split(line, separator) or ()]
     decimal_comma = form.decimal == "," if form.decimal else separator != "," and _has_decimal_commas(fields)
     row = (_split(first[1][1], separator) if len(first) > 1 else None) or []
@@ -99,7 +108,43 @@ def text_table(path: Path, content: bytes, names: Collection[str], form: TableFo
 
     own = [name_and_unit(name)[1] for name in header]
     units = tuple(unit or (row[i] if has_units and i < len(row) else "") for i, unit in enumerate(own))
-    return Table(path, tuple(header), header_line, units, decimal_comma, tuple(read_as), blocks)
+    return Table(path, tuple(header), header_line, units, decimal_comma, tuple(read_as), blocks, doubt)
+
+
+def _fitting(
+    path: Path,
+    header: list[str],
+    first: list[tuple[int, str]],
+    separator: str,
+    absent: tuple[str, ...],
+    is_used: Callable[[str], bool] | None,
+) -> tuple[list[str], str]:
+    """The names that have a field in the lines, and what was guessed of that.
+
+    Where all lines have too few fields, and just as many names are of no use, it is these that have none.
+
+    Raises:
+        BagError: all lines have too few fields, and it is not plain which names have none; or a name that a description
+            has for absent is not there.
+    """
+    for name in absent:
+        if name not in header:
+            raise BagError(f"{path}: line {first[0][0]}: no column {name}, which table.absent names")
+    header = [name for name in header if name not in absent]
+    counts = {len(_split(line, separator) or ()) for _, line in first[1:]}
+    short = len(header) - counts.pop() if len(counts) == 1 and 0 not in counts else 0
+    if short <= 0 or separator == " ":
+        return header, ""
+    unused = [name for name in header if is_used is not None and not is_used(name)]
+    found = f"all lines have {len(header) - short} fields under {len(header)} names"
+    if len(unused) != short:
+        raise BagError(
+            f"{path}: line {first[0][0]}: {found}: expected as many; a description says which names have no field by "
+            "table: {absent: [NAME]}"
+        )
+    named = ", ".join(unused)
+    doubt = f"{found}; {named}, which nothing uses, is taken to have none (table: {{absent: [{named}]}} tells it)"
+    return [name for name in header if name not in unused], doubt
 
 
 def _numbered(text: str) -> Iterator[tuple[int, str]]:

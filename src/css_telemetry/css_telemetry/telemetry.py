@@ -10,14 +10,14 @@ import numpy as np
 
 from css_recording.errors import BagError
 from css_telemetry.cell_outputs import cell_outputs
-from css_telemetry.columns import Readings, read_columns
-from css_telemetry.description import Description
+from css_telemetry.columns import Readings, groups_of, read_columns
+from css_telemetry.description import ColumnForm, Description
 from css_telemetry.faults import Account, Counted
-from css_telemetry.header import column_of, completed, long_form
+from css_telemetry.header import column_of, completed, is_read_by_name, long_form
 from css_telemetry.motion import attitudes_of, directions_of, vectors_of
 from css_telemetry.places import Place, place_of
 from css_telemetry.table_files import open_table
-from css_telemetry.table_text import Table
+from css_telemetry.table_text import Table, name_and_unit
 
 LEAST_PLAUSIBLE, MOST_PLAUSIBLE = 0.1, 3.0  # largest output of any cell that is in units of full Sun
 
@@ -54,12 +54,14 @@ class Telemetry:
         wheels: (N, W) speeds [rad/s].
         temperatures: (N,) [deg C] of each column.
         place: measured positions.
+        sunlight: (N,) part of the sunlight that the spacecraft said it was in.
         truth: what estimates are held against.
         account: what became of the lines.
         ignored_columns: columns not used.
         read_as: what is unusual about the form of the table.
         scaled: the output of a cell that the Sun meets head-on was stated.
         sha256: of the file.
+        doubt: what of the form of the table had to be guessed against what stands there; empty: nothing.
     """
 
     description: Description
@@ -76,6 +78,8 @@ class Telemetry:
     wheels: np.ndarray | None = None
     place: Place | None = None
     temperatures: dict[str, np.ndarray] = dataclasses.field(default_factory=dict)
+    doubt: str = ""
+    sunlight: np.ndarray | None = None
 
     @property
     def blind(self) -> np.ndarray:
@@ -132,7 +136,15 @@ def open_described(path: Path, content: bytes, description: Description) -> Tabl
     """The table in a file, by what a description says of its form."""
     names = {"time", "timestamp", "sun_x", "sun_y", "sun_z", *(cell.column for cell in description.cells)}
     times = description.time.columns if description.time is not None else ("time",)
-    return open_table(path, content, names | set(times), description.table, times)
+    named = names | set(times) | {name for group in groups_of(description) for name in group.columns}
+
+    def is_used(name: str) -> bool:
+        known = name in named or name_and_unit(name)[0] in named
+        return known or (not description.names_roles and is_read_by_name(name))
+
+    # in the long form the columns are names in the lines
+    knows = None if description.table.long_name else is_used
+    return open_table(path, content, names | set(times), description.table, times, knows)
 
 
 def _refuse_different_units(table: Table, description: Description) -> None:
@@ -169,6 +181,7 @@ def _telemetry(
         (*table.read_as, *notes, *(f"cell outputs in {unit}" for unit in units)),
         full_scale is not None or description.scaled,
         sha256,
+        doubt=table.doubt,
     )
     if aiding is not None:
         telemetry.rate = None if aiding.rate is None else vectors_of(readings, aiding.rate)
@@ -177,6 +190,8 @@ def _telemetry(
             telemetry.wheels = readings.matrix(aiding.wheels.columns) * aiding.wheels.factor
         if aiding.position is not None and aiding.position.columns:
             telemetry.place = place_of(readings, aiding.position)
+        if aiding.illumination is not None:
+            telemetry.sunlight = _sunlight(readings, aiding.illumination, eclipse=aiding.eclipse)
         for form in aiding.temperatures:
             telemetry.temperatures[form.column] = readings.values[form.column] * form.factor + form.offset
     _count_missing(telemetry, lines)
@@ -194,9 +209,7 @@ def _truth(readings: Readings, description: Description) -> TrueMotion:
         return TrueMotion()
     illumination = None
     if form.illumination is not None:
-        illumination = np.clip(readings.values[form.illumination.column], 0.0, 1.0)
-        if form.eclipse:
-            illumination = 1.0 - illumination
+        illumination = _sunlight(readings, form.illumination, eclipse=form.eclipse)
     return TrueMotion(
         None if form.sun is None else directions_of(readings, form.sun),
         None if form.attitude is None else attitudes_of(readings, form.attitude),
@@ -204,6 +217,12 @@ def _truth(readings: Readings, description: Description) -> TrueMotion:
         None if form.position is None or not form.position.columns else place_of(readings, form.position),
         illumination,
     )
+
+
+def _sunlight(readings: Readings, form: ColumnForm, *, eclipse: bool) -> np.ndarray:
+    """(N,) part of the sunlight, of a column that tells it or the shadow."""
+    told = np.clip(readings.values[form.column], 0.0, 1.0)
+    return 1.0 - told if eclipse else told
 
 
 def _count_missing(telemetry: Telemetry, lines: np.ndarray) -> None:

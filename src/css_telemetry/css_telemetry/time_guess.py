@@ -10,7 +10,7 @@ from css_telemetry.description import TimeForm
 from css_telemetry.header import plain_name
 from css_telemetry.instants import instant_ns
 from css_telemetry.table_text import Table, name_and_unit
-from css_telemetry.units import TIME_UNITS, plain_unit
+from css_telemetry.units import TIME_UNITS, plain_unit, unit_of_our_days
 from css_telemetry.values import is_number
 
 _TIME = re.compile(
@@ -20,7 +20,6 @@ _TIME = re.compile(
 _DATE = re.compile(r"(?:.*_)?(?:date|day|doy)")
 _WEEK = re.compile(r"(?:gps_?)?(?:week|wn)(?:_?n(?:o|umber)?)?")
 _OF_WEEK = re.compile(r"(?:gps_?)?(?:tow|sow|seconds?_of_week|time_of_week)(?:_s)?")
-_FIRST_NS, _LAST_NS = 946_684_800 * 10**9, 2_145_916_800 * 10**9  # 2000 to 2038
 _GPS_FIRST_S, _GPS_LAST_S = 6.3e8, 1.9e9  # 2000 to 2038 since 1980
 
 
@@ -91,10 +90,10 @@ def _of_column(table: Table, name: str, text: str, plain: str, decimal_comma: bo
         for unit in units:
             if scale == "tai" or _GPS_FIRST_S < value * TIME_UNITS[unit] * 1e-9 < _GPS_LAST_S:
                 return TimeGuess(TimeForm((name,), unit, scale), f"{scale.upper()} by its name", True)
-    for unit in units:
-        if _FIRST_NS <= value * TIME_UNITS[unit] < _LAST_NS:
-            why = f"{text} {unit} since 1970 is a time of our days"
-            return TimeGuess(TimeForm((name,), unit, "unix"), why, told in TIME_UNITS or unit != "s" or value > 9.4e8)
+    found = unit_of_our_days(value, units)
+    if found is not None:
+        why = f"{text} {found} since 1970 is a time of our days"
+        return TimeGuess(TimeForm((name,), found, "unix"), why, told in TIME_UNITS or found != "s" or value > 9.4e8)
     unit = told if told in TIME_UNITS else "s"
     why = f"{text} {unit} is no time of our days: since a boot whose instant the table does not tell"
     return TimeGuess(TimeForm((name,), unit, "boot"), why, False)

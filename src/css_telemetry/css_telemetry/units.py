@@ -3,11 +3,21 @@
 
 import math
 import re
+from collections.abc import Iterable
+
+_DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
 
 TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "min": 60 * 10**9, "h": 3600 * 10**9, "d": 86400 * 10**9}
 """Nanoseconds in the units that times can have."""
 
-_DEGREE, _TURN = math.pi / 180.0, 2.0 * math.pi
+_FIRST_NS, _LAST_NS = 946_684_800 * 10**9, 2_145_916_800 * 10**9  # 2000 to 2038
+
+
+def unit_of_our_days(value: float, units: Iterable[str] = ("s", "ms", "us", "ns")) -> str | None:
+    """The unit in which a count since 1970 is a time of our days; None: in none. The spans do not overlap."""
+    return next((unit for unit in units if _FIRST_NS <= value * TIME_UNITS[unit] < _LAST_NS), None)
+
+
 RATES = {"rad/s": 1.0, "mrad/s": 1e-3, "deg/s": _DEGREE, "mdeg/s": 1e-3 * _DEGREE, "rpm": _TURN / 60.0}
 FIELDS = {"T": 1.0, "mT": 1e-3, "uT": 1e-6, "nT": 1e-9, "G": 1e-4, "mG": 1e-7}
 LENGTHS = {"m": 1.0, "km": 1e3}

@@ -4,7 +4,8 @@
 The cells alone decide with hysteresis in level and time: darkness begins an eclipse when the brightest cell
 stays below `dark_level` for `dark_time`, light ends it when it stays above `lit_level` for `lit_time`. In
 between the verdict stands. Cells can also go dark because they fail or because the layout has holes; an
-orbit model can be wrong by its ephemeris. With `both`, an eclipse needs the two to agree.
+orbit model can be wrong by its ephemeris. With `both`, an eclipse needs the two to agree. With `flag` the spacecraft
+says it by means of its own, such as the current of its panels; while it says nothing the cells decide.
 """
 
 from typing import NamedTuple
@@ -20,11 +21,16 @@ from css_estimation.sun.sun_heading import (
     Sky,
 )
 
-_SOURCES = {"sensors": 0, "model": 1, "both": 2}
+_SOURCES = {"sensors": 0, "model": 1, "both": 2, "flag": 1}  # a flag has the word as a model has
 _MODEL = _SOURCES["model"]
 _SENSORS = _SOURCES["sensors"]
 
-SOURCE = choice("eclipse.source", "sensors", tuple(_SOURCES), "who decides on eclipse; both: the two must agree")
+SOURCE = choice(
+    "eclipse.source",
+    "sensors",
+    tuple(_SOURCES),
+    "who decides on eclipse; both: the two must agree; flag: the spacecraft, by `sunlight/illuminance`",
+)
 
 
 class EclipseParameters(NamedTuple):

@@ -13,7 +13,13 @@ from css_common.sections import ORBIT_SOURCE
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.mean_earth import MeanEarth, PredictedLight
 from css_estimation.sun.eclipse_detector import SOURCE
-from css_estimation.sun.sun_heading import PREDICTION_ECLIPSED, PREDICTION_SUNLIT, UNKNOWN_SKY, Sky
+from css_estimation.sun.sun_heading import (
+    PREDICTION_ECLIPSED,
+    PREDICTION_SUNLIT,
+    PREDICTION_UNKNOWN,
+    UNKNOWN_SKY,
+    Sky,
+)
 
 USE_ORBIT = flag("use_orbit", True, "use the place in orbit, where the mission has one: shadow and light of the Earth")
 
@@ -74,7 +80,24 @@ def flight_sky(values: Values) -> FlightSky | None:
 
 def asks_for_sky(values: Values) -> bool:
     """Whether a Sun estimator's values ask for a model of where the spacecraft is."""
-    return (SOURCE in values and values[SOURCE] != "sensors") or knows_place(values)
+    return (SOURCE in values and values[SOURCE] in ("model", "both")) or knows_place(values)
+
+
+def hears_flag(values: Values) -> bool:
+    """Whether an estimator with these values takes the shadow from what the spacecraft says of it."""
+    return SOURCE in values and values[SOURCE] == "flag"
+
+
+def flagged(sky: Sky, sunlight: float | None) -> Sky:
+    """A sky whose shadow is what the spacecraft says.
+
+    Args:
+        sunlight: part of the Sun's light that it says it is in; None: it says nothing, and the cells decide.
+    """
+    if sunlight is None:
+        return sky._replace(predicted=PREDICTION_UNKNOWN)
+    predicted = PREDICTION_ECLIPSED if sunlight < _HALF else PREDICTION_SUNLIT
+    return sky._replace(predicted=predicted, illumination=sunlight)
 
 
 def knows_place(values: Values) -> bool:

@@ -14,11 +14,11 @@ from css_common.message_columns import Columns
 from css_common.mission import Node
 from css_common.schema import Table, Values
 from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
-from css_common.sensor_inputs import field_input, gyro_input
+from css_common.sensor_inputs import FULL_SUN_LUX, field_input, gyro_input, sunlight_input
 from css_estimation.health import watched
 from css_estimation.messages import cells_input, sun_estimate_fields, wheels_input
 from css_estimation.sun.field_rate import USE_FIELD as RATE_BY_FIELD
-from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flight_sky, sky_at
+from css_estimation.sun.flight_sky import USE_FIELD, asks_for_sky, flagged, flight_sky, hears_flag, sky_at
 from css_estimation.sun.heading_dispatch import home_of
 from css_estimation.sun.heading_loop import cycle_of
 from css_estimation.sun.low_pass import low_pass_gain
@@ -49,6 +49,8 @@ def inputs_of(values: Values) -> tuple[Input, ...]:
         inputs.append(gyro_input(values))
     if hears_field(values):
         inputs.append(field_input(values))
+    if hears_flag(values):
+        inputs.append(sunlight_input())
     if hears_wheels(values):
         inputs.append(wheels_input(values))
     return tuple(inputs)
@@ -168,6 +170,7 @@ class SunEstimator(Component):
         self._last_stamp_ns: int | None = None
         self._mode_log = ModeLog(self.mode_names, self.epoch_ns) if self.mode_names else None
         self._sky = flight_sky(self.values)
+        self._by_flag = hears_flag(self.values)
         self._health = HealthReport() if self.values[watched.ENABLED] else None
         self._cycles = 0
 
@@ -184,7 +187,7 @@ class SunEstimator(Component):
         from css_estimation.sun.sky_table import sky_table
 
         measured = measured_in(steps, self._calibrated)
-        if measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
+        if self._by_flag or measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
             return None
         stamps = steps.stamps_ns
         before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns
@@ -209,7 +212,11 @@ class SunEstimator(Component):
         self._last_stamp_ns = stamp_ns
         cells = received["cells"]
         assert cells is not None  # a required input
-        aiding = aiding_of(received, sky_at(self._sky, stamp_ns), self._calibrated)
+        sky = sky_at(self._sky, stamp_ns)
+        if self._by_flag:
+            sunlight = received.get("sunlight")
+            sky = flagged(sky, None if sunlight is None else min(1.0, max(0.0, sunlight.illuminance / FULL_SUN_LUX)))
+        aiding = aiding_of(received, sky, self._calibrated)
         self._state, heading = self._step(
             self._parameters,
             self._state,

@@ -23,6 +23,7 @@ not known is zero there and told as unknown. An orbit that nobody gave is none: 
 _EXAMPLES = (
     "docs/samples/my_cells.csv docs/samples/my_layout.yaml -o bags/mine",
     "docs/samples/my_cells.csv --describe -o mine.yaml",
+    "march.csv mine.yaml --calibration my_cells.yaml -o bags/march",
     "counts.csv layout.yaml --epoch 2024-03-20T12:00:00Z --full-scale 3000 --skip-bad --json",
 )
 _EXITS = {
@@ -64,6 +65,9 @@ def _parser() -> CommandParser:
         metavar="V",
         type=positive,
         help="what the Sun, met head-on, adds to a cell's dark level (default: the description's, else 1)",
+    )
+    parser.add_argument(
+        "--calibration", metavar="FILE", help="what `calibrate` found of these sensors: replays of the recording use it"
     )
     parser.add_argument(
         "--skip-bad", action="store_true", help="lines and values that cannot be read are no reason for exit code 1"

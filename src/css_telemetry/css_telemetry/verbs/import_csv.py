@@ -8,6 +8,7 @@ from pathlib import Path
 
 from css_common.command import DONE, FAILED, USAGE, CommandParser, complain
 from css_common.epochs import parse_utc
+from css_common.mission import MissionError
 from css_common.progress_lines import still_working
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
@@ -38,8 +39,9 @@ def run(parser: CommandParser, options: argparse.Namespace) -> int:
                 time_unit=options.time_unit,
             )
             refuse_unscaled(telemetry, source)
-            report = examined(telemetry, folder)
-    except BagError as error:
+            calibration = None if options.calibration is None else Path(options.calibration)
+            report = examined(telemetry, folder, calibration)
+    except (BagError, MissionError) as error:
         complain(parser.prog, error)
         return USAGE
     try:
@@ -55,8 +57,8 @@ def run(parser: CommandParser, options: argparse.Namespace) -> int:
 
 def _verdict(parser: CommandParser, report: ImportReport, skip_bad: bool) -> int:
     """Says what was not as it should be; the exit code knows it."""
-    wrong = []
-    account = report.telemetry.account
+    account, doubt = report.telemetry.account, report.telemetry.doubt
+    wrong = [doubt] if doubt and not skip_bad else []
     if not skip_bad and (account.refused or account.repaired):
         counts = f"{account.refused_lines} lines refused, {account.repaired_values} values left out"
         wrong.append(f"{counts} of {account.lines} lines; --skip-bad takes that as it is")
