@@ -10,6 +10,7 @@ are temperature coefficients and no temperature is heard, scales are those at th
 """
 
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,8 @@ from sensor_msgs.msg import Temperature
 
 from css_common.codec import Sample
 from css_common.component import Finding, Input
+from css_common.mission_extends import sections_alone
+from css_common.mission_file import MissionError
 from css_common.schema import Parameter, Values
 from css_common.sections import MEASURED_FIELD_BIAS, MEASURED_FIELD_MATRIX, MEASURED_GYRO_BIAS
 from css_common.vectors import Vec3, vector_of
@@ -35,6 +38,7 @@ TEMPERATURE_TOPIC = "css/temperature"
 HELD_S = 600.0
 """Time [s] for which a temperature stands for the one there is: cells of a spacecraft change by some kelvin in it."""
 
+_MEASURED = ".measured."
 _NO_ESTIMATE = -1.0  # first element of a covariance: the quantity is not measured
 _NOTHING: Vec3 = (0.0, 0.0, 0.0)
 
@@ -144,6 +148,21 @@ def _given(values: Values, parameter: Parameter[Any]) -> np.ndarray:
     if parameter not in values:
         return np.zeros(0)
     return np.asarray(values[parameter], dtype=np.float64)
+
+
+def calibration_sections(path: str | Path) -> dict[str, dict[str, Any]]:
+    """Flat parameters of each section of a file that `calibrate` wrote, for `Mission.with_sections`.
+
+    Raises:
+        MissionError: it cannot be read, or tells nothing of any sensor.
+    """
+    sections = sections_alone(path)
+    if not any(_MEASURED in name for parameters in sections.values() for name in parameters):
+        raise MissionError(
+            f"{path}: tells nothing of a sensor, expected cells.measured, gyro.measured or magnetometer.measured, as "
+            "`calibrate --out` writes them"
+        )
+    return sections
 
 
 def is_calibrated(values: Values) -> bool:

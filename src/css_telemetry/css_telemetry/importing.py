@@ -13,12 +13,12 @@ import numpy as np
 from css_common.component import Finding
 from css_common.epochs import format_utc
 from css_common.mission import mission_from_text
-from css_common.mission_extends import sections_alone
 from css_common.progress_lines import ProgressLines
 from css_environment.orbit import TleOrbit
 from css_environment.tle_checks import tle_findings
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
+from css_sensors.calibrated_readings import calibration_sections
 from css_telemetry.description import Description
 from css_telemetry.description_file import read_description
 from css_telemetry.orbit_arcs import FAR_S, Arcs, fit_arcs
@@ -143,7 +143,7 @@ def _mission_text(report: ImportReport, name: str) -> str:
     text = mission_text(report.telemetry, report.orbit, name, report.period_s, report.longest_gap_s)
     if report.calibration is None:
         return text
-    mission = mission_from_text(text, str(report.recording)).with_sections(sections_alone(report.calibration))
+    mission = mission_from_text(text, str(report.recording)).with_sections(calibration_sections(report.calibration))
     _ = mission.values  # read as a whole, so that what does not fit is refused here
     return mission.text()
 

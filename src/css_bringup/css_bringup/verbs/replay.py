@@ -13,9 +13,9 @@ from css_bringup.replay_verdict import is_rounding
 from css_bringup.replayed import Replayed
 from css_bringup.report import print_json
 from css_common.command import FAILED
-from css_common.mission_extends import sections_alone
 from css_common.mission_file import MissionError
 from css_common.progress_lines import still_working
+from css_sensors.calibrated_readings import calibration_sections
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     requests = [parse_request(text) for text in arguments.estimators]
     mission = mission_of_bag(arguments.bag, remap, arguments.overrides, arguments.mission)
     if arguments.calibration is not None:
-        mission = mission.with_sections(sections_alone(arguments.calibration))
+        mission = mission.with_sections(calibration_sections(arguments.calibration))
     out = arguments.out or default_replay(arguments.bag, overwrite=arguments.overwrite)
     with still_working(f"replaying {arguments.bag}"):
         result = replay(
