@@ -14,7 +14,7 @@ from css_telemetry.faults import Account, Broken, add
 from css_telemetry.header import column_of, long_form
 from css_telemetry.instants import stamps_of
 from css_telemetry.sentinels import fill_values
-from css_telemetry.table_text import Block, Table
+from css_telemetry.table_text import Block, Table, listed
 from css_telemetry.values import numbers_of
 
 
@@ -120,7 +120,7 @@ def read_columns(table: Table, description: Description) -> Readings:
 def _found(table: Table, name: str) -> int:
     index = column_of(table, name)
     if index is None:
-        raise ValueError(f"no column {name}, which the description names; the header is {', '.join(table.header)}")
+        raise ValueError(f"no column {name}, which the description names; the header is {listed(table.header)}")
     return index
 
 

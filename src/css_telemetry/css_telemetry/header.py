@@ -4,7 +4,7 @@
 import re
 
 from css_telemetry.description import Aiding, Description, TimeForm, Truth, VectorForm
-from css_telemetry.table_text import Table, name_and_unit
+from css_telemetry.table_text import Table, listed, name_and_unit
 from css_telemetry.units import RATES, TIME_UNITS, plain_unit, unit_of_our_days
 from css_telemetry.values import is_number
 
@@ -65,7 +65,7 @@ def _check_header(table: Table) -> None:
     """Raises ValueError when the first line names no columns, or one twice."""
     header = table.header
     if header and all(map(is_number, header)):
-        raise ValueError(f"no column time; the header is {', '.join(header)}; the first line must name the columns")
+        raise ValueError(f"no column time; the header is {listed(header)}; the first line must name the columns")
     for name in header:
         if name and header.count(name) > 1:
             raise ValueError(f"two columns are called {name}")
@@ -129,8 +129,7 @@ def _time_column(table: Table, others: list[int]) -> int:
         if found:
             return found[0]
     raise ValueError(
-        f"no column time; the header is {', '.join(table.header) or 'empty'}; a description names any other "
-        "(--describe proposes one)"
+        f"no column time; the header is {listed(table.header)}; a description names any other (--describe proposes one)"
     )
 
 

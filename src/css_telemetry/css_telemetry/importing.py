@@ -143,7 +143,7 @@ def _mission_text(report: ImportReport, name: str) -> str:
     text = mission_text(report.telemetry, report.orbit, name, report.period_s, report.longest_gap_s)
     if report.calibration is None:
         return text
-    mission = mission_from_text(text, str(report.recording)).with_sections(calibration_sections(report.calibration))
+    mission = mission_from_text(text, str(report.calibration)).with_sections(calibration_sections(report.calibration))
     _ = mission.values  # read as a whole, so that what does not fit is refused here
     return mission.text()
 

@@ -8,7 +8,7 @@ import numpy as np
 from css_recording.errors import BagError
 from css_telemetry.description import TableForm
 from css_telemetry.faults import Broken
-from css_telemetry.table_text import Block, Table
+from css_telemetry.table_text import Block, Table, listed
 from css_telemetry.values import Column
 
 _BLOCK = 20_000
@@ -31,7 +31,7 @@ def pivoted(table: Table, form: TableForm, times: tuple[str, ...]) -> Table:
     for name in (*times, form.long_name, form.long_value):
         if name not in table.header:
             raise BagError(
-                f"{table.path}: line {table.header_line}: no column {name}; the header is {', '.join(table.header)}"
+                f"{table.path}: line {table.header_line}: no column {name}; the header is {listed(table.header)}"
             )
     at = [table.header.index(name) for name in (*times, form.long_name, form.long_value)]
     names: dict[str, int] = {}

@@ -12,7 +12,7 @@ from css_telemetry.guesses import Guess, Guesses, guessed
 from css_telemetry.header import plain_name
 from css_telemetry.sentinels import fill_values
 from css_telemetry.table_files import open_table
-from css_telemetry.table_text import Table
+from css_telemetry.table_text import Table, listed
 from css_telemetry.telemetry import LEAST_PLAUSIBLE, MOST_PLAUSIBLE
 from css_telemetry.time_guess import TimeGuess, guessed_time
 from css_telemetry.units import OUTPUTS, plain_unit
@@ -46,13 +46,13 @@ def proposed(path: Path) -> str:
     time = guessed_time(table, texts, table.decimal_comma)
     if time is None:
         raise BagError(
-            f"{path}: line {table.header_line}: no column looks like a time; the header is {', '.join(table.header)}"
+            f"{path}: line {table.header_line}: no column looks like a time; the header is {listed(table.header)}"
         )
     first = _numbers(table, texts)
     guesses = guessed(table, first, time.form.columns)
     if not guesses.cells:
         raise BagError(
-            f"{path}: line {table.header_line}: no column looks like a cell; the header is {', '.join(table.header)}"
+            f"{path}: line {table.header_line}: no column looks like a cell; the header is {listed(table.header)}"
         )
     return "\n".join(_lines(path, table, long, time, guesses, first)) + "\n"
 

@@ -7,7 +7,7 @@ Nothing is guessed that changes a value without saying so: `Table.read_as` names
 import csv
 import io
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
@@ -28,6 +28,7 @@ _COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?", re.ASCII)
 _POINT_NUMBER = re.compile(r"[-+]?(?:\d+\.\d*|\.\d+)(?:[eE][-+]?\d+)?", re.ASCII)
 _UNIT = re.compile(r"\s*[\[(]([^\])]*)[\])]\s*$")
 _BLOCK = 20_000
+_LONGEST = 300  # characters of a header in a message
 _LOOKED_AT = 2_000  # lines by which separator and decimal mark are found
 
 
@@ -55,6 +56,12 @@ class Table(NamedTuple):
     read_as: tuple[str, ...]  # what is not a UTF-8 text with commas and decimal points
     blocks: Callable[[], Iterator[Block]]
     doubt: str = ""  # what of the form had to be guessed against what stands there
+
+
+def listed(header: Sequence[str]) -> str:
+    """Names of columns for a message, which stays a line although a file may be anything."""
+    names = ", ".join(header) or "empty"
+    return names if len(names) <= _LONGEST else f"{names[:_LONGEST]} ..."
 
 
 def name_and_unit(column: str) -> tuple[str, str]:

@@ -53,8 +53,11 @@ def test_a_calibration_goes_into_the_mission_of_the_recording(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        (CALIBRATION.replace("[0.9, 1.1]", "[0.9]"), "1 given, expected one for each of the 2"),
-        (CALIBRATION.replace("measured", "measurd"), "measurd"),
+        (
+            CALIBRATION.replace("[0.9, 1.1]", "[0.9]"),
+            "c.yaml: /**: cells.measured.scales: 1 given, expected one for each of the 2",
+        ),
+        (CALIBRATION.replace("measured", "measurd"), "c.yaml: tells nothing of a sensor"),
         ("", "c.yaml: tells nothing of a sensor, expected cells.measured"),
         (None, "c.yaml"),
     ],

@@ -232,3 +232,9 @@ def test_every_line_is_used_or_refused(tmp_path_factory, lines):
     assert len(telemetry.stamps_ns) + account.refused_lines == account.lines == len(lines)
     for refused in (*account.refused.values(), *account.repaired.values()):
         assert 3 <= refused.first_line <= 2 * len(lines) + 1
+
+
+def test_a_header_of_rubbish_makes_a_line_that_can_be_read(tmp_path):
+    with pytest.raises(BagError) as told:
+        read(tmp_path, b"\x44" * 5000 + b"\n1,2\n")
+    assert "no column time; the header is DDD" in str(told.value) and len(str(told.value)) < 600

@@ -33,6 +33,7 @@ _CELL_HEADINGS = {
     "tilt_2": "tilt 2\n[deg]",
     "temperature_coefficient": "by temperature\n[%/K]",
 }
+_SAME_DEG = 1e-3  # of cells that were right already a calibration changes headings by rounding
 _PERCENT = {"temperature_coefficient": 100.0}
 
 
@@ -69,7 +70,7 @@ def _shortcoming(result: Calibration) -> str:
     if not result.observed.any():
         return "no parameter of any cell was told"
     before, after = mean_deg(result.before), mean_deg(result.after)
-    if before is not None and after is not None and after >= before:
+    if before is not None and after is not None and after > before + _SAME_DEG:
         return f"the heading of the part that was held out errs by {after:.3f} deg, by {before:.3f} before"
     return ""
 

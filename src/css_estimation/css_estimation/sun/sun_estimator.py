@@ -186,8 +186,10 @@ class SunEstimator(Component):
         from css_estimation.sun.heading_loop import loop_of, new_headings
         from css_estimation.sun.sky_table import sky_table
 
+        if self._by_flag:
+            return None  # what the spacecraft says of the shadow comes at times of its own
         measured = measured_in(steps, self._calibrated)
-        if self._by_flag or measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
+        if measured is None or not self._is_found or not self._silent_so_far(int(steps.stamps_ns[0])):
             return None
         stamps = steps.stamps_ns
         before = stamps[0] - self.period_ns if self._last_stamp_ns is None else self._last_stamp_ns
