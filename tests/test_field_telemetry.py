@@ -255,3 +255,48 @@ def test_the_proposed_description_reads_what_the_layout_does(name, tmp_path, cap
         np.testing.assert_array_equal(old.voltages, new.voltages)
     for old, new in zip(truth, samples(by_proposal, "/truth", SpacecraftState), strict=True):
         np.testing.assert_array_equal([old.sun_n, old.omega_bn_b], [new.sun_n, new.omega_bn_b])
+
+
+COEFFICIENTS = np.array([0.004, -0.003, 0.002, -0.004, 0.003, -0.002])
+CALIBRATION = f"""\
+/**:
+  ros__parameters:
+    cells:
+      measured: {{temperature_coefficients: {COEFFICIENTS.tolist()}, temperature: 20.0}}
+"""
+
+
+def test_a_calibration_follows_the_temperature_that_is_recorded_and_says_where_there_is_none(tmp_path, capsys):
+    """Cells that warm from 20 to 60 deg C while the body turns; every fifth line has their temperature."""
+    lines = (FIELD / "01_base.csv").read_text().splitlines()
+    names, rows = lines[0].split(","), [line.split(",") for line in lines[1:]]
+    at = [names.index(f"css_{face}") for face in ("px", "mx", "py", "my", "pz", "mz")]
+    warm = 20.0 + 40.0 * np.arange(len(rows)) / len(rows)
+    for k, row in enumerate(rows):
+        for i, c in zip(at, COEFFICIENTS, strict=True):
+            # a temperature stands until the next is told
+            row[i] = f"{float(row[i]) * (1.0 + c * (warm[k - k % 5] - 20.0)):.9f}"
+        row.append(f"{warm[k]:.9f}" if k % 5 == 0 else "")
+    text = "\n".join(",".join(row) for row in [[*names, "temp"], *rows]) + "\n"
+    (tmp_path / "warm.csv").write_text(text)
+    (tmp_path / "c.yaml").write_text(CALIBRATION)
+    aiding = (
+        "aiding: {rate: {columns: [omega_x_deg_s, omega_y_deg_s, omega_z_deg_s], unit: deg/s}, temperatures: [%s]}\n"
+    )
+    truth = "truth: {sun: {columns: [sun_x, sun_y, sun_z]}}\n"
+    worst, told = {}, {}
+    for name, temperatures in (("heard", "{column: temp, unit: degC}"), ("deaf", "")):
+        described = tmp_path / f"{name}.yaml"
+        described.write_text(DESCRIBED + aiding % temperatures + truth)
+        bag = tmp_path / name / "bag"
+        calibrated = ["--calibration", str(tmp_path / "c.yaml")]
+        assert main([str(tmp_path / "warm.csv"), str(described), "-o", str(bag), *calibrated]) == 0
+        result = replayed(bag, "ekf", "wls")
+        worst[name] = max(worst_deg(result, "ekf"), worst_deg(result, "wls"))
+        told[name] = [line for run in result.replayed for line in run.notes]
+    assert worst["heard"] < 0.1 and told["heard"] == []
+    assert worst["deaf"] > 1.0
+    assert len(told["deaf"]) == 2
+    assert all(
+        "no temperature (css/temperature) was heard at any time, where scales are" in line for line in told["deaf"]
+    )

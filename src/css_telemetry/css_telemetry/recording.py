@@ -164,17 +164,7 @@ def _truth(states: TrueStates, k: int, stamp_ns: int) -> bytes:
 
 
 def _measured(telemetry: Telemetry, row: int, stamp_ns: int, blind: bool) -> Iterator[tuple[Topic, bytes]]:
-    if not blind:
-        codec = codec_of(CssVoltages)
-        yield VOLTAGES, codec.encode(codec.sample(stamp_ns, BODY_FRAME, voltages=telemetry.cells[row]))
-    if telemetry.rate is not None:
-        yield IMU, _imu(telemetry.rate[row], stamp_ns)
-    if telemetry.field is not None:
-        yield FIELD, _field(telemetry.field[row], stamp_ns)
-    if telemetry.wheels is not None and np.isfinite(telemetry.wheels[row]).all():
-        codec = codec_of(WheelState)
-        speed = telemetry.wheels[row]
-        yield WHEELS, codec.encode(codec.sample(stamp_ns, BODY_FRAME, speed=speed, torque=np.zeros(len(speed))))
+    # what stands until it is told anew comes before the readings of its stamp, which it holds for
     if telemetry.sunlight is not None and np.isfinite(telemetry.sunlight[row]):
         codec = codec_of(Illuminance)
         lux = FULL_SUN_LUX * float(telemetry.sunlight[row])
@@ -187,6 +177,17 @@ def _measured(telemetry: Telemetry, row: int, stamp_ns: int, blind: bool) -> Ite
                 topic,
                 codec.encode(codec.sample(stamp_ns, BODY_FRAME, temperature=float(values[row]))),
             )
+    if not blind:
+        codec = codec_of(CssVoltages)
+        yield VOLTAGES, codec.encode(codec.sample(stamp_ns, BODY_FRAME, voltages=telemetry.cells[row]))
+    if telemetry.rate is not None:
+        yield IMU, _imu(telemetry.rate[row], stamp_ns)
+    if telemetry.field is not None:
+        yield FIELD, _field(telemetry.field[row], stamp_ns)
+    if telemetry.wheels is not None and np.isfinite(telemetry.wheels[row]).all():
+        codec = codec_of(WheelState)
+        speed = telemetry.wheels[row]
+        yield WHEELS, codec.encode(codec.sample(stamp_ns, BODY_FRAME, speed=speed, torque=np.zeros(len(speed))))
 
 
 def _imu(rate: np.ndarray, stamp_ns: int) -> bytes:
