@@ -66,9 +66,10 @@ def write_recording(
     Raises:
         BagError: the recording cannot be written.
     """
-    topics = [TRUTH] * (states is not None) + [VOLTAGES] + [IMU] * (telemetry.rate is not None)
+    # topics of one stamp stand in this order: what stands until it is told anew comes before the readings that it is for
+    topics = [SUNLIGHT] * (telemetry.sunlight is not None) + [*_temperature_topics(telemetry).values()]
+    topics += [TRUTH] * (states is not None) + [VOLTAGES] + [IMU] * (telemetry.rate is not None)
     topics += [FIELD] * (telemetry.field is not None) + [WHEELS] * (telemetry.wheels is not None)
-    topics += [SUNLIGHT] * (telemetry.sunlight is not None) + [*_temperature_topics(telemetry).values()]
     origin = {"file": source.name, "sha256": telemetry.sha256, "truth": list(states.known) if states else []}
     metadata = {
         "mission": mission,
@@ -164,7 +165,6 @@ def _truth(states: TrueStates, k: int, stamp_ns: int) -> bytes:
 
 
 def _measured(telemetry: Telemetry, row: int, stamp_ns: int, blind: bool) -> Iterator[tuple[Topic, bytes]]:
-    # what stands until it is told anew comes before the readings of its stamp, which it holds for
     if telemetry.sunlight is not None and np.isfinite(telemetry.sunlight[row]):
         codec = codec_of(Illuminance)
         lux = FULL_SUN_LUX * float(telemetry.sunlight[row])

@@ -139,7 +139,9 @@ def _fitting(
             raise BagError(f"{path}: line {first[0][0]}: no column {name}, which table.absent names")
     header = [name for name in header if name not in absent]
     counts = {len(_split(line, separator) or ()) for _, line in first[1:]}
-    short = len(header) - counts.pop() if len(counts) == 1 and 0 not in counts else 0
+    # one line alone may as well be cut off
+    alike = len(first) > 2 and len(counts) == 1 and 0 not in counts
+    short = len(header) - counts.pop() if alike else 0
     if short <= 0 or separator == " ":
         return header, ""
     unused = [name for name in header if is_used is not None and not is_used(name)]

@@ -154,7 +154,6 @@ REFUSED = [
     ("2024-366T00:00:61,1,1,0,0,0,1,0,0", "column time: '2024-366T00:00:61' found", "no time"),
     ("2023-366T00:00:00,1,1,0,0,0,1,0,0", "column time: '2023-366T00:00:00' found", "no time"),
     ('1370000001,"1,1,0,0,0,1,0,0', "a quotation mark is left open", "not readable"),
-    ("1370000000000,1,1,0,0,0,1,0,0", "is a time since 1970 in ms: --time-unit ms", "no time"),
     (
         "12.5,1,1,0,0,0,1,0,0",
         "12.5 s is not a time since 1970; --epoch, or time: epoch, names its beginning",
