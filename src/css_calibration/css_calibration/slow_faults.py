@@ -2,6 +2,7 @@
 """Faults that no single output shows: noise, and a scale or level that changes with age."""
 
 import math
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +13,8 @@ from css_calibration.recorded import Recorded
 from css_common.health import KIND_DRIFTING, KIND_NOISY
 
 _TIMES, _LEAST_NOISE = 3.0, 0.008
+_BRIGHTNESS = (0.02, 0.15, 0.4, 0.7, np.inf)  # outputs within which noise is alike
+_FEWEST_OTHERS = 2
 _BLOCKS = 8
 _FEWEST = 12  # lit outputs of a block
 _SIGMAS, _CHANGE = 6.0, 0.06
@@ -27,19 +30,36 @@ class Slow(NamedTuple):
 
 
 def noisy_cells(recorded: Recorded) -> dict[int, Slow]:
-    """Cells whose outputs change more from sample to sample than those of the others."""
+    """Cells whose outputs change more from sample to sample than those of others that are as bright.
+
+    Noise goes with the light where it is a loss or a jitter: a lit cell is not to be held against dark ones.
+    """
     thirds = np.abs(np.diff(recorded.voltages, n=3, axis=0))
-    bright = recorded.voltages[3:] > 0.02
-    noise = []
-    for i in range(recorded.voltages.shape[1]):
-        values = thirds[bright[:, i] & np.isfinite(thirds[:, i]), i]
-        noise.append(1.4826 * float(np.median(values)) / math.sqrt(20.0) if len(values) > _FEWEST else math.nan)
-    usual = float(np.nanmedian(noise)) if np.isfinite(noise).any() else math.nan
-    found = {}
-    for i, sigma in enumerate(noise):
-        if sigma > max(_TIMES * usual, usual + _LEAST_NOISE):
-            found[i] = Slow(KIND_NOISY, f"noise of {sigma:.4f} where others have {usual:.4f}")
-    return found
+    brightness = np.median([recorded.voltages[k : len(thirds) + k] for k in range(4)], axis=0)
+    worst: dict[int, tuple[float, float]] = {}  # noise of each cell that is beyond, and that of others as bright
+    for low, high in pairwise(_BRIGHTNESS):
+        noise = _noise_between(thirds, brightness, low, high)
+        for i in np.flatnonzero(np.isfinite(noise)).tolist():
+            others = np.delete(noise, i)
+            if np.isfinite(others).sum() < _FEWEST_OTHERS:
+                continue
+            usual = float(np.nanmedian(others))
+            if noise[i] > max(_TIMES * usual, usual + _LEAST_NOISE) and noise[i] > worst.get(i, (0.0, 0.0))[0]:
+                worst[i] = (float(noise[i]), usual)
+    return {
+        i: Slow(KIND_NOISY, f"noise of {sigma:.4f} where others as bright have {usual:.4f}")
+        for i, (sigma, usual) in worst.items()
+    }
+
+
+def _noise_between(thirds: np.ndarray, brightness: np.ndarray, low: float, high: float) -> np.ndarray:
+    """(N,) noise of each cell [-] by third differences (M, N), while it is so bright; NaN: too seldom."""
+    noise = np.full(thirds.shape[1], np.nan)
+    for i in range(len(noise)):
+        inside = (brightness[:, i] > low) & (brightness[:, i] <= high) & np.isfinite(thirds[:, i])
+        if inside.sum() > _FEWEST:
+            noise[i] = 1.4826 * float(np.median(thirds[inside, i])) / math.sqrt(20.0)
+    return noise
 
 
 def ageing(data: CellData, result: Fit, cell: int) -> Slow | None:

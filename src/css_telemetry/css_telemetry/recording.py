@@ -66,7 +66,7 @@ def write_recording(
     Raises:
         BagError: the recording cannot be written.
     """
-    # topics of one stamp stand in this order: what stands until it is told anew comes before the readings that it is for
+    # topics of one stamp stand in this order: what stands until it is told anew, then the readings that it is for
     topics = [SUNLIGHT] * (telemetry.sunlight is not None) + [*_temperature_topics(telemetry).values()]
     topics += [TRUTH] * (states is not None) + [VOLTAGES] + [IMU] * (telemetry.rate is not None)
     topics += [FIELD] * (telemetry.field is not None) + [WHEELS] * (telemetry.wheels is not None)

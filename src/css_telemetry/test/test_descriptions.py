@@ -183,7 +183,10 @@ def test_long_form_with_repetitions(tmp_path):
         ("aiding: {rate: {columns: [a, b, c]}}", "aiding.rate.unit: missing, expected one of rad/s"),
         ("aiding: {rate: {columns: [a, b, c], unit: T}}", "aiding.rate.unit: 'T' given, expected one of rad/s"),
         ("aiding: {rate: {columns: [a, b, c], unit: rpm, axes: [x, x, z]}}", "expected x, y and z in some order"),
-        ("aiding: {sun: 3}", "aiding: unknown key sun, expected eclipse, field, illumination, position, rate, temperatures, wheels"),
+        (
+            "aiding: {sun: 3}",
+            "aiding: unknown key sun, expected eclipse, field, illumination, position, rate, temperatures, wheels",
+        ),
         ("truth: {field: 3}", "truth: unknown key field"),
         ("truth: {attitude: {columns: [a, b, c, d], order: abcd}}", "truth.attitude.order: 'abcd' given"),
         (
