@@ -6,7 +6,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import Imu, MagneticField, Temperature
 
-from css_common.codec import codec_of
+from css_common.codec import Sample, codec_of
 from css_common.component import Cycles
 from css_common.message_columns import Columns
 from css_common.mission import MissionError, load_mission
@@ -111,7 +111,9 @@ def headings_at(degrees, voltages, overrides):
         stamp_ns = component.epoch_ns + k * component.period_ns
         cells = codec_of(CssVoltages).sample(stamp_ns, "bus", voltages=outputs)
         heard = None if degrees is None else temperature(degrees, stamp_ns)
-        told.append(component.cycle(stamp_ns, {"cells": cells, "gyro": None, "temperature": heard})["estimate"].sun_b)
+        estimate = component.cycle(stamp_ns, {"cells": cells, "gyro": None, "temperature": heard})["estimate"]
+        assert isinstance(estimate, Sample)
+        told.append(estimate.sun_b)
     return np.array(told), component.standing().warning
 
 

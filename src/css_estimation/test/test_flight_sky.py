@@ -7,7 +7,7 @@ from okeefe_spacecraft import okeefe_values
 from presence import present
 from sensor_msgs.msg import Illuminance
 
-from css_common.codec import codec_of
+from css_common.codec import Sample, codec_of
 from css_common.component import Cycles
 from css_common.epochs import parse_utc
 from css_common.sensor_inputs import FULL_SUN_LUX
@@ -85,6 +85,8 @@ def test_a_flag_of_the_spacecraft_has_the_word_on_the_shadow_and_without_it_the_
         stamp_ns = component.epoch_ns + k * component.period_ns
         cells = codec_of(CssVoltages).sample(stamp_ns, "bus", voltages=np.full(8, 0.5))
         flag = None if lux is None else codec_of(Illuminance).sample(stamp_ns, "bus", illuminance=lux)
-        told.append(component.cycle(stamp_ns, {"cells": cells, "sunlight": flag})["estimate"].eclipse)
+        estimate = component.cycle(stamp_ns, {"cells": cells, "sunlight": flag})["estimate"]
+        assert isinstance(estimate, Sample)
+        told.append(estimate.eclipse)
     assert told == [0, 0, 1, 1, 0]
     assert component.cycle_through(Cycles(np.array([0]), {}, {})) is None

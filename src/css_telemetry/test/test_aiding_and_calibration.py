@@ -2,6 +2,7 @@
 """What a recording of telemetry holds for estimators beside readings: the flag of a shadow, a calibration."""
 
 import pytest
+from presence import present
 from sensor_msgs.msg import Illuminance
 
 from css_common.codec import codec_of
@@ -44,7 +45,7 @@ def test_a_calibration_goes_into_the_mission_of_the_recording(tmp_path, capsys):
     assert main([*options, "--calibration", str(tmp_path / "c.yaml")]) == 0
     assert f"calibration: {tmp_path / 'c.yaml'}, taken off by whoever replays" in capsys.readouterr().out
     with BagReader(tmp_path / "bag") as reader:
-        mission = mission_from_text(reader.mission_text, "bag")
+        mission = mission_from_text(present(reader.mission_text), "bag")
         outputs = [codec_of(CssVoltages).decode(m.data).voltages for m in reader.messages(["/css/voltages"])]
     assert mission.values.cells.measured.scales.tolist() == [0.9, 1.1]
     assert outputs[0].tolist() == [0.9, 0.1]
