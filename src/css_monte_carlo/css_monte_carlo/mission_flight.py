@@ -18,6 +18,7 @@ from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace
 from css_environment.albedo_vector import MODELS
 from css_environment.earth_light import new_light
+from css_estimation.calibrated_readings import corrections
 from css_estimation.health import watched
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
@@ -206,6 +207,7 @@ class MissionFlight:
             speeds=np.zeros_like(momentum),
             rod_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             voltages=np.zeros((len(keys), len(nominal))),
+            corrected=np.zeros((len(keys), len(nominal))),
             healthy=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
@@ -282,6 +284,8 @@ class MissionFlight:
             attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
             heading=self._heading_parameters(heading),
             attitude=_parameters(self._filter, attitude),
+            heading_corrections=corrections(heading),
+            attitude_corrections=corrections(attitude),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
             tachometer=tachometer.parameters(plant),

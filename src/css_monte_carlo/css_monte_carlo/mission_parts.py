@@ -6,7 +6,6 @@ from typing import NamedTuple
 from css_analysis.configured_mission import is_attitude
 from css_common.component import Component
 from css_common.mission import Mission, MissionError, Node
-from css_estimation.calibrated_readings import is_calibrated
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.sun_estimator import SunEstimator
@@ -50,9 +49,6 @@ def parts_of(mission: Mission, estimator: str | None = None) -> Parts:
     for listed in mission.nodes:
         if not issubclass(listed.component, _PLACES):
             raise _no_place(mission, f"the compiled loop has no place for the node {listed.name}")
-    for listed in mission.nodes:
-        if is_calibrated(listed.values):
-            raise _no_place(mission, f"the compiled loop has no place for the calibration of {listed.name}")
     control = _part(mission, Controller)
     parts = Parts(
         plant=_needed(mission, Dynamics),
