@@ -72,6 +72,9 @@ _LONG = (
     "tests/test_own_estimator.py::test_the_compiled_loop_flies_the_same",
     "tests/test_replay_stretches.py",
     "tests/test_three_hosts.py",
+    "tests/test_without_ros.py::test_budgets",
+    "tests/test_without_ros.py::test_layouts",
+    "tests/test_without_ros.py::test_papers",
 )
 
 
