@@ -52,6 +52,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 # What takes longest, mostly to compile, and is shown by others of its kind too. `./sunpoint test` leaves it out;
 # `./sunpoint test -m long` runs it, and so does naming its file.
 _LONG = (
+    "src/css_design/test/test_budget.py::test_noise_of_a_new_cubesat_does_not_add_up_in_the_loop",
     "src/css_design/test/test_budget.py::test_scale_and_tilt_of_cells_against_the_geometry",
     "src/css_design/test/test_new_mission.py::test_six_faces_acquire_the_sun",
     "src/css_monte_carlo/test/test_attitude_monte_carlo.py::test_a_case_is_the_flight_of_the_nodes_bit_for_bit[by the",
@@ -67,9 +68,13 @@ _LONG = (
     "tests/test_monte_carlo_flies_as_the_graph.py::test_every_step_of_a_case_equals_that_of_the_composed_graph[s",
     "tests/test_monte_carlo_flies_as_the_graph.py::test_every_step_of_a_case_equals_that_of_the_composed_graph[w",
     "tests/test_monte_carlo_flies_as_the_graph.py::test_torque_rods_without_wheels_and_gyro_equal_the_composed_graph",
+    "tests/test_monte_carlo_flies_as_the_graph.py::test_a_dispersed_case_equals_that_of_the_composed_graph[so",
     "tests/test_own_estimator.py::test_the_compiled_loop_flies_the_same",
     "tests/test_replay_stretches.py",
     "tests/test_three_hosts.py",
+    "tests/test_without_ros.py::test_budgets",
+    "tests/test_without_ros.py::test_layouts",
+    "tests/test_without_ros.py::test_papers",
 )
 
 

@@ -8,6 +8,7 @@ from listing import MISSIONS, anywhere, controlled_by, estimators_by_mission
 
 from css_analysis.configured_mission import configured
 from css_analysis.flight_log import read_flight
+from css_common.drawn_mission import drawn
 from css_common.mission import find_mission, load_mission, mission_from_text
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_monte_carlo.chunk import fly_cases
@@ -119,3 +120,48 @@ def test_a_harder_truth_equals_the_composed_graph(tmp_path):
     assert log.true_wheels is not None and not np.array_equal(log.true_wheels.speed, log.having("wheels").speed)
     assert log.epoch_ns == mission.epoch_ns and mission.epoch_ns % 10**9 == 0
     assert len(trace) == 600
+
+
+CALIBRATED = (
+    "css_array.scale_cell_error=0.1",
+    "css_array.bias=0.01",
+    "cells.measured.scales=1.03,0.97,1.1,0.9,1.013,0.987,1.07,0.93",
+    "cells.measured.darks=0.01,-0.01,0.003,0.007,-0.002,0.0,0.011,0.009",
+    "gyro.measured.bias_deg_h=12.3,-4.5,6.7",
+)
+
+
+def test_readings_that_a_calibration_corrects_equal_those_of_the_composed_graph(tmp_path):
+    mission = load_mission("okeefe_2013", ["mission.duration=60.0", *CALIBRATED])
+    fly_composed(configured(mission, case=CASE), tmp_path / "bag")
+    trace = fly_cases(MissionFlight(mission), np.array([CASE]), 10, traced=True).trace[0]
+    np.testing.assert_array_equal(trace, trace_of_log(read_flight(tmp_path / "bag"), "ekf"))
+    assert len(trace) == 600
+    uncorrected = load_mission("okeefe_2013", ["mission.duration=60.0", *CALIBRATED[:2]])
+    assert not np.array_equal(trace, fly_cases(MissionFlight(uncorrected), np.array([CASE]), 10, traced=True).trace[0])
+
+
+DISPERSED = (
+    "dispersions.dynamics.spacecraft.inertia.each=normal:0.05",
+    "dispersions.wheels.max_torque=uniform:0.5",
+    "dispersions.cells.field_of_view_deg=uniform:112:125",
+    "dispersions.css_array.noise=uniform:0:0.02",
+    "dispersions.css_array.albedo.factor=uniform:0.5:1.5",
+    "dispersions.css_array.degradation_mode=choice:common:per_cell",
+    "dispersions.gyro.bias_deg_h=lognormal:0.5",
+    "dispersions.ekf.cell_sigma=normal:0.1",
+    "dispersions.mrp_control.gains.k=normal:0.1",
+    "dispersions.orbit.altitude=normal:0.1",
+)
+
+
+@pytest.mark.parametrize("sampling", ["random", "sobol"])
+def test_a_dispersed_case_equals_that_of_the_composed_graph(sampling, tmp_path):
+    """What a study writes for `fly` flies its cases: draws of truth, sensors and flight software, at every step."""
+    design = () if sampling == "random" else (f"sampling.method={sampling}", "sampling.cases=16")
+    study = load_mission("okeefe_2013", ["mission.duration=60.0", *DISPERSED, *design])
+    fly = mission_from_text(study.text(), "mission.yaml")
+    fly_composed(drawn(configured(fly, case=CASE)).mission, tmp_path / "bag")
+    trace = fly_cases(MissionFlight(study), np.array([3, CASE]), 10, traced=True).trace
+    np.testing.assert_array_equal(trace[1], trace_of_log(read_flight(tmp_path / "bag"), "ekf"))
+    assert len(trace[1]) == 600 and not np.array_equal(trace[0], trace[1])

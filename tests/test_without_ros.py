@@ -157,3 +157,46 @@ def test_verdicts_on_cells(both):
 def test_tables(both, verb, arguments):
     outputs = both(verb, *arguments, "--json")
     assert result(outputs[0]) == result(outputs[1])
+
+
+def test_pages_of_recordings(both, tmp_path):
+    outputs = both("report", REFERENCE, "-o", "page.html", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path, "page.html")
+
+
+def test_calibrations(both, tmp_path):
+    # 1: a recording of three minutes tells little, and the heading is no better for it
+    outputs = both("calibrate", REFERENCE, "--out", "cells.yaml", "--json", expected=(0, 1))
+    assert result(outputs[0]) == result(outputs[1])
+    assert len(result(outputs[0])["parameters"]) > 10
+    assert_same_files(tmp_path, "cells.yaml")
+
+
+SUNNY = ("--set", "mission.duration=600", "--set", "orbit.true_anomaly_deg=60")
+
+
+def test_layouts(both, tmp_path):
+    outputs = both("layout", "okeefe_2013", *SUNNY, "--out", "found", "--json", "--cells", "2-3")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path, "found/okeefe_2013_2_cells.yaml", "found/okeefe_2013_3_cells.yaml")
+
+
+def test_flight_code(both, tmp_path):
+    outputs = both("export", "okeefe_2013", "--components", "mrp_control", "-o", "code", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path)
+    assert any(name.endswith(".h") for name in files(tmp_path / "without"))
+
+
+@pytest.mark.parametrize("options", [(REFERENCE,), ("okeefe_2013", *SUNNY, "--quick")], ids=["recording", "mission"])
+def test_budgets(both, options):
+    outputs = both("budget", *options, "--json", expected=(0, 1))
+    assert result(outputs[0]) == result(outputs[1])
+    assert result(outputs[0])["heading"]["sources"]
+
+
+def test_papers(both, tmp_path):
+    outputs = both("reproduce", "clark", "--quick", "--cases", "2", "--out", "paper", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert_same_files(tmp_path)

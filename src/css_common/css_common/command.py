@@ -5,11 +5,12 @@ import argparse
 import importlib
 import math
 import os
+import re
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Never
+from typing import Any, Never
 
 DONE = 0
 FAILED = 1
@@ -20,8 +21,17 @@ _EXITS = {DONE: "done", USAGE: "something asked for is wrong", INTERRUPTED: "int
 _RED, _PLAIN = "\x1b[31m", "\x1b[0m"
 
 
+# Values that begin with a minus and are no options: numbers, several of them, and faces of a body.
+_VALUES = re.compile(r"-(\.?\d|[xyz](,|$))")
+
+
 class CommandParser(argparse.ArgumentParser):
-    """Parser whose errors look like every other error of the command."""
+    """Parser whose errors look like every other error of the command, and for which `-x` is a face of a body."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        # as argparse has it for single numbers alone: a word of this kind is a value where no such option is declared
+        self._negative_number_matcher = _VALUES
 
     def error(self, message: str) -> Never:
         """Prints one line, and ends the process."""

@@ -50,6 +50,18 @@ def test_a_wrong_option_is_one_line_that_names_the_help(parser, capsys):
     )
 
 
+def test_faces_and_numbers_below_zero_are_values(parser, capsys):
+    parser.add_argument("--faces", nargs="+")
+    parser.add_argument("--inertia")
+    read = parser.parse_args(["--faces", "+x", "-x", "-z", "--inertia", "-0.05,0.04,0.02"])
+    assert (read.faces, read.inertia) == (["+x", "-x", "-z"], "-0.05,0.04,0.02")
+    assert parser.parse_args(["--faces", "-x,+y", "-.5"]).faces == ["-x,+y", "-.5"]
+    for word in ("-xy", "-q"):
+        with pytest.raises(SystemExit):
+            parser.parse_args(["--faces", "+x", word])
+    assert "unrecognized arguments: -xy" in capsys.readouterr().err
+
+
 def raising(error):
     def run():
         raise error

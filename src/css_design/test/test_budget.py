@@ -21,6 +21,8 @@ from css_design.budget.recorded import recorded_budget
 from css_design.budget.sources import SOURCES, heard_sources, is_active, seeing_everywhere, without
 from css_design.budget.turning import Follower
 from css_design.commands import budget
+from css_design.errors import DesignError
+from css_design.new_mission.new_mission import new_mission, read_items
 from css_monte_carlo.mission_flight import MissionFlight
 
 STARING = (
@@ -122,6 +124,30 @@ def test_propagation_meets_the_monte_carlo_where_errors_are_ordinary():
     assert summed == pytest.approx(math.sqrt(sum(row.predicted**2 for row in heading.values())))
     assert summed == pytest.approx(whole, rel=0.35)
     assert found.acquired == 16
+
+
+def test_noise_of_a_new_cubesat_does_not_add_up_in_the_loop():
+    """A body that holds the Sun along one face: four dark cells read what is left of the noise above zero.
+
+    Taken for light, it pulls the estimate off, the body follows, and half an hour later they are a degree off.
+    """
+    mission = new_mission("mine", *read_items({}, "3u")).mission.with_overrides(["mission.duration=1800"])
+    heard = heard_sources(mission)
+    ideal = without(mission, heard)
+    noise = without(mission, [source for source in heard if source.name != "noise"])
+    deaf = noise.with_overrides(["sun_filter.output_low=-10"])
+    flown = measured.fly({"none": ideal, "noise": noise, "deaf": deaf}, 4, nothing)
+    alone, misled = (root_mean_square(flown[name].heading, flown["none"].heading).value for name in ("noise", "deaf"))
+    assert math.degrees(alone) < 0.3 < 0.5 < math.degrees(misled)
+
+
+@pytest.mark.parametrize("given", ["cells.measured.scales=1,1,1,1,1,1,1,1", "gyro.measured.bias_deg_h=1,2,3"])
+def test_a_calibrated_mission_is_refused_with_the_reason(given):
+    with pytest.raises(
+        DesignError, match=r"okeefe_2013.*measured.* given, .* nobody has calibrated; expected"
+    ) as error:
+        budget_of(load_mission("okeefe_2013", [given]), 2, 1, nothing, nothing)
+    assert "\n" not in str(error.value)
 
 
 def test_sources_of_a_mission():

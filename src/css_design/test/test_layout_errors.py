@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from css_common.direction_grid import SIZE, grid_cell, grid_directions
 from css_common.mission import load_mission
 from css_design.errors import DesignError
-from css_design.layout.heading_error import Knowledge, heading_error
+from css_design.layout.heading_error import Knowledge, heading_error, tail_mean
 from css_design.layout.judge import Aims, LayoutJudge
 from css_design.layout.placements import FACES, allowed, candidates, faces_of
 from css_design.layout.readings import Cells, Readings
@@ -75,6 +75,18 @@ def test_the_shift_is_that_of_the_smallest_sum_of_squares(seed):
     expected = math.sqrt(shift**2 + np.trace(np.linalg.inv(j)))
     found = heading_error(normals, readings, scenes_at([sun]), Knowledge(sigma, prior), np.arange(6))
     assert found.mean == pytest.approx(expected, rel=1e-2)  # four steps of Gauss-Newton
+
+
+def test_the_tail_is_the_mean_of_the_worst_twentieth_of_the_weight():
+    rng = np.random.default_rng(4)
+    errors, times = rng.uniform(size=300), rng.integers(1, 5, size=300)
+    # as many copies as its weight has quarters
+    copies = np.sort(np.repeat(errors, times))[::-1]
+    count = len(copies)
+    assert tail_mean(errors, times / count, 60 / count) == pytest.approx(copies[:60].mean(), rel=1e-12)
+    assert tail_mean(errors, times / count, 1.0) == pytest.approx(copies.mean(), rel=1e-12)
+    found = error_at(FACES_B[::2], np.ones(3) / math.sqrt(3.0))
+    assert found.tail == pytest.approx(found.mean, rel=1e-12)
 
 
 def test_an_unseen_sun_leaves_a_guess():

@@ -17,6 +17,7 @@ from css_design.new_mission.gains import gain_margin_db
 from css_design.new_mission.new_mission import new_mission, read_items
 from css_design.new_mission.questions import ask
 from css_design.new_mission.templates import TEMPLATES
+from css_design.verbs import new as new_verb
 from css_monte_carlo.study import Configuration, run_study
 from sunpoint_control.control_checks import loop_model
 from sunpoint_control.loop_stability import Gains
@@ -94,6 +95,8 @@ WRONG = [
     (["--inertia", "1,2,0,0,1,0,0,0,1"], "--inertia: not symmetric"),
     (["--tip-off", "60"], "expected at most 10.9 deg/s: the wheels take 0.01 N m s"),
     (["--cells", "+x,foo"], "--cells: 'foo' given, expected a face"),
+    (["--cells", ",".join(["+x"] * 200)], "--cells: 200 directions given, expected 1 to 32"),
+    (["--out", "/proc/none/mine.yaml"], "/proc/none/mine.yaml: cannot be written: No such file or directory"),
     (["--array-normal", "up"], "--array-normal: 'up' given, expected a face"),
     (["--orbit", "tle nowhere.tle"], "--orbit: nowhere.tle: cannot be read"),
     (["--epoch", "2060-01-01"], "mission.epoch: 2060-01-01T00:00:00Z given"),
@@ -121,6 +124,23 @@ def test_names_and_files_are_guarded(tmp_path, monkeypatch, capsys):
     assert new.main(["mine", "--overwrite"]) == 0
     assert "precious" not in (tmp_path / "mine.yaml").read_text()
     assert "is there already" in capsys.readouterr().err
+
+
+def test_of_two_at_once_one_says_that_the_file_is_there(tmp_path, monkeypatch, capsys):
+    """The other one writes between the first look and the end."""
+    monkeypatch.chdir(tmp_path)
+    designed = new_verb.new_mission
+
+    def slow(*arguments):
+        made = designed(*arguments)
+        (tmp_path / "mine.yaml").write_text("of the other")
+        return made
+
+    monkeypatch.setattr(new_verb, "new_mission", slow)
+    assert new.main(["mine", "--yes"]) == USAGE
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == "new: error: mine.yaml: is there already, expected a new file, another --out or --overwrite"
+    assert (tmp_path / "mine.yaml").read_text() == "of the other"
 
 
 def test_json_and_list(tmp_path, monkeypatch, capsys):

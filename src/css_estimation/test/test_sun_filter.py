@@ -23,6 +23,7 @@ from css_estimation.sun.sun_heading import (
 )
 from css_estimation.sun_filter import filter_state, sun_filter
 from css_estimation.sun_filter.cell_model import rising
+from css_estimation.sun_filter.cell_update import read_above
 from css_estimation.sun_filter.response import respond
 
 SIX = LAYOUTS["six faces"]
@@ -317,6 +318,23 @@ def test_a_cell_at_grazing_light_is_taken_for_both(mean):
     slope = weights @ ((c - mean) * lit) / sigma**2
     left = weights @ (lit - expected - slope * (c - mean)) ** 2
     np.testing.assert_allclose(rising(mean, sigma**2), (expected, slope, left), atol=2e-6)
+
+
+@pytest.mark.parametrize("output", [0.0, 0.002, 0.01, 0.03])
+def test_noise_that_ends_with_the_converter_is_taken_for_what_it_is(output):
+    """Mean, spread and slope of max(low, output + noise) against draws; a dark cell reads 0.4 of the noise."""
+    noise, low, dark = 0.006, 0.0, -0.001
+    p = sun_filter.parameters(
+        okeefe_values(SunFilter.table(), noise=noise, output_low=low, calibration__darks=[dark] * 8)
+    )
+    draws = noise * np.random.default_rng(3).normal(size=400_000)
+    read = np.maximum(low - dark, output + draws)
+    mean, slope, variance = read_above(p, output, low - dark)
+    assert mean == pytest.approx(read.mean(), abs=4e-5)
+    assert slope == pytest.approx(np.mean(output + draws > low - dark), abs=4e-3)
+    assert variance == pytest.approx(read.var(), rel=0.02)
+    nowhere = sun_filter.parameters(okeefe_values(SunFilter.table(), noise=noise))
+    assert read_above(nowhere, output, nowhere.errors.output_low) == (output, 1.0, nowhere.errors.noise)
 
 
 def test_faces_that_graze_the_sun_do_not_mislead():

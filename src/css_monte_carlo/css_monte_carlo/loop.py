@@ -25,6 +25,7 @@ from css_monte_carlo.named_faults import note_kinds
 from css_monte_carlo.state_table import keep_state, state_of
 from css_monte_carlo.step_truth import Truth
 from css_monte_carlo.surroundings import Surroundings, gather_light_at, state_at
+from css_sensors.corrections import Corrections, correct_cells, heard_field, heard_rate
 from css_sim import gyro, magnetometer, tachometer
 from css_sim.actuator_faults import Felt, spoil_actuators
 from css_sim.disturbances import with_dipole
@@ -51,6 +52,9 @@ class Vehicle(NamedTuple):
     attitude_hears_wheels: bool
     heading: Any  # parameters of the Sun estimator, or None
     attitude: Any  # parameters of the attitude filter, or None
+    heading_corrections: Corrections  # of readings, by a calibration that the Sun estimator knows
+    attitude_corrections: Corrections  # the same of the attitude filter
+    control_corrections: Corrections  # and of the control law, which hears the field
     control: Any  # parameters of the control law, or None
     craft: Spacecraft  # nominal
     tachometer: Tachometer
@@ -73,6 +77,7 @@ class Cases(NamedTuple):
     speeds: np.ndarray  # (C, N) [rad/s]
     rod_dipole: np.ndarray  # (C, M) [A m^2]
     voltages: np.ndarray  # (C, n) [V]
+    corrected: np.ndarray  # (C, n) [V] room for what a calibration makes of them
     healthy: np.ndarray  # (C, n) [V] what the cells of cases with faults would read without them
     rates: np.ndarray  # (C, 3) [rad/s] omega_bn_b after the last block
     cells: np.ndarray  # (C, n) of cell_errors.CELL
@@ -164,23 +169,34 @@ def fly_block(
             tachometer.report(v.tachometer, faults, key, step, speeds)
             sky = sky_at(around.sky, around.sky_light, k)
             field_is_new = v.heading_hears_field and read.field_valid
-            aiding = Aiding(read.gyro_b, read.gyro_valid, field_b, field_is_new, speeds, v.heading_hears_wheels, sky)
+            heard, known = voltages, v.heading_corrections
+            if known.of_cells:
+                heard = cases.corrected[c]
+                correct_cells(known, voltages, heard)
+            gyro_b = heard_rate(known, read.gyro_b, read.gyro_valid)
+            heard_b = heard_field(known, field_b, field_is_new)
+            aiding = Aiding(gyro_b, read.gyro_valid, heard_b, field_is_new, speeds, v.heading_hears_wheels, sky)
             heading_state, heading = estimate_heading(
-                v.heading, heading_state, state.heading_memory, since_s, voltages, aiding
+                v.heading, heading_state, state.heading_memory, since_s, heard, aiding
             )
             # the node of a filter counts from its first stamp, that of a Sun estimator begins with a period
             filtered_s = since_s if step > 0 else 0.0
             sky = sky_at(around.attitude_sky, around.attitude_sky_light, k)
             field_is_new = v.attitude_hears_field and read.field_valid
-            aiding = Aiding(
-                read.gyro_b, read.gyro_valid, read.field_b, field_is_new, speeds, v.attitude_hears_wheels, sky
-            )
+            heard, known = voltages, v.attitude_corrections
+            if known.of_cells:
+                heard = cases.corrected[c]
+                correct_cells(known, voltages, heard)
+            gyro_b = heard_rate(known, read.gyro_b, read.gyro_valid)
+            heard_b = heard_field(known, read.field_b, field_is_new)
+            aiding = Aiding(gyro_b, read.gyro_valid, heard_b, field_is_new, speeds, v.attitude_hears_wheels, sky)
             attitude_state, attitude = estimate_attitude(
-                v.attitude, attitude_state, state.memory, filtered_s, voltages, aiding, around, k
+                v.attitude, attitude_state, state.memory, filtered_s, heard, aiding, around, k
             )
             # as the control node has it: the last measurement, for as long as the next may be on its way
             field_valid = v.control_hears_field and field_step >= 0 and step - field_step < v.sensors.field_divider
-            held = HeldField(field_b, field_valid, v.control_hears_field and read.field_valid)
+            heard_b = heard_field(v.control_corrections, field_b, field_step >= 0)
+            held = HeldField(heard_b, field_valid, v.control_hears_field and read.field_valid)
             control_state, left = command(
                 v.control, control_state, state.control_memory, since_s, heading, speeds, held, torque, dipole
             )

@@ -31,6 +31,7 @@ from css_monte_carlo.loop import TRUTH_COLUMNS, Cases, CaseState, Vehicle
 from css_monte_carlo.measures import ATTITUDE, HEADING
 from css_monte_carlo.mission_parts import parts_of
 from css_monte_carlo.surroundings import SurroundingsTables
+from css_sensors.corrections import corrections
 from css_sim import (
     actuator_faults,
     axis_faults,
@@ -206,6 +207,7 @@ class MissionFlight:
             speeds=np.zeros_like(momentum),
             rod_dipole=np.zeros((len(keys), len(plant.rods.axes) if plant.rods.fitted else 0)),
             voltages=np.zeros((len(keys), len(nominal))),
+            corrected=np.zeros((len(keys), len(nominal))),
             healthy=np.zeros((len(keys), len(nominal))),
             rates=np.zeros((len(keys), 3)),
             cells=cells,
@@ -282,6 +284,9 @@ class MissionFlight:
             attitude_hears_wheels=self._aided is not None and hears_wheels(self._aided),
             heading=self._heading_parameters(heading),
             attitude=_parameters(self._filter, attitude),
+            heading_corrections=corrections(heading),
+            attitude_corrections=corrections(attitude),
+            control_corrections=corrections(control),
             control=_parameters(self._control, control),
             craft=spacecraft(plant, self._key(0), plant.substeps),
             tachometer=tachometer.parameters(plant),

@@ -11,7 +11,6 @@ from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.flight_sky import hears_flag
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_msgs.msg import SunEstimate
-from css_sensors.calibrated_readings import is_calibrated
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
@@ -52,8 +51,6 @@ def parts_of(mission: Mission, estimator: str | None = None) -> Parts:
         if not issubclass(listed.component, _PLACES):
             raise _no_place(mission, f"the compiled loop has no place for the node {listed.name}")
     for listed in mission.nodes:
-        if is_calibrated(listed.values):
-            raise _no_place(mission, f"the compiled loop has no place for the calibration of {listed.name}")
         if hears_flag(listed.values):
             raise _no_place(mission, f"the compiled loop has no place for the eclipse flag of {listed.name}")
     control = _part(mission, Controller)

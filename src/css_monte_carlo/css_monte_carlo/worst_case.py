@@ -9,6 +9,7 @@ import math
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -23,15 +24,18 @@ from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight
 from css_common.sampling import sample_of
 from css_common.schema import ParameterError
+from css_common.sections import name_for_files
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
+from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
+from css_monte_carlo.stepped_flight import SteppedFlight
 from css_monte_carlo.study import Configuration, Study
 
 FILE = "worst.yaml"
-"""Mission of the worst case in the folder of a study."""
+"""Mission of the worst case in the folder of a study of one configuration; of several each has one of its name."""
 
 _EDGE = 0.5 * math.erfc(3.0 / math.sqrt(2.0))  # 3 sigma of a normal parameter
 _LEAST_PARENTS = 8
@@ -103,7 +107,7 @@ def find_worst(
         quantity: column of the table of cases; empty: the first that is told of the estimator.
 
     Raises:
-        StudyError: there is no such quantity, or the loop has no place for the mission.
+        StudyError: there is no such quantity.
     """
     name = quantity or summaries_of(study, configuration.estimator)[0].of
     if name not in study.cases.column_names:
@@ -117,7 +121,7 @@ def find_worst(
         search.run(threads)
     except KeyboardInterrupt:
         interrupted = True
-    flown, file = search.mission_of(search.worst), study.folder / FILE
+    flown, file = search.mission_of(search.worst), study.folder / _file_name(configuration, study)
     file.write_text(flown.text(), encoding="utf-8")
     return Worst(
         configuration.columns,
@@ -130,6 +134,13 @@ def find_worst(
         search.flown,
         interrupted,
     )
+
+
+def _file_name(configuration: Configuration, study: Study) -> str:
+    if len(study.manifest["configurations"]) == 1:
+        return FILE
+    gyro = "gyro" if configuration.gyro else "no_gyro"
+    return f"{name_for_files('_'.join(['worst', configuration.estimator, gyro, *configuration.overrides]))}.yaml"
 
 
 def _badness(value: float | None) -> float:
@@ -158,11 +169,11 @@ class _Search:
         progress: Callable[[int, int], None] | None,
     ) -> None:
         self._mission, self._estimator, self._quantity = mission, estimator, quantity
-        try:
+        self._base: MissionFlight | None = None  # None: flown node by node
+        with suppress(NoPlace):
             self._base = MissionFlight(mission, estimator)
-        except NoPlace as reason:
-            raise StudyError(f"--worst: {reason}; the search flies in the compiled loop alone") from reason
-        self._share = not self._base.own_places and share_surroundings(mission.dispersions)
+        alike = self._base is not None and not self._base.own_places and share_surroundings(mission.dispersions)
+        self._surrounded_as = self._base if alike else None
         self._most, self._progress = flights, progress
         self._lock = threading.Lock()
         self.flown = 0
@@ -226,10 +237,15 @@ class _Search:
             preflight(mission)
         except (ParameterError, MissionError):
             return _Flight(_CANNOT_FLY, case, {})
-        flight = MissionFlight(mission, self._estimator, self._base if self._share else None)
         try:
-            tallies, _, _ = fly_cases(flight, np.array([case]), self._mission.steps)
+            tallies = self._tallies(mission, np.array([case]))
         except StudyError:
             return _Flight(_CANNOT_FLY, case, {})
         table = case_table(np.array([case]), tallies, mission.period_ns * 1e-9, windows_of(mission))
         return _Flight(_badness(table[self._quantity][0].as_py()), case, drawn)
+
+    def _tallies(self, mission: Mission, case: np.ndarray) -> CaseTallies:
+        if self._base is None:
+            return SteppedFlight(mission, self._estimator).fly(case, mission.steps)[0]
+        flight = MissionFlight(mission, self._estimator, self._surrounded_as)
+        return fly_cases(flight, case, mission.steps).tallies

@@ -65,6 +65,15 @@ VARIANTS = {
         "attitude_voltage.calibration.mode=estimate",
         "attitude_vector.reference.field_degree=6",
     ),
+    "readings that a calibration corrects": lambda: mission(
+        "mission.case=4",
+        "css_array.scale_cell_error=0.1",
+        "cells.measured.scales=1.03,0.97,1.1,0.9,1.013,0.987",
+        "cells.measured.darks=0.01,-0.01,0.003,0.007,-0.002,0.0",
+        "gyro.measured.bias_deg_h=1.3,-4.5,0.7",
+        "magnetometer.measured.bias_nt=120.0,-35.0,77.0",
+        "magnetometer.measured.matrix=1.02,0.003,-0.004,0.003,0.97,0.011,-0.004,0.011,1.013",
+    ),
     "each case has its own Earth": lambda: mission("mission.case=2", *LIT, "css_array.albedo.draw=per_cell"),
     "scripted changes": lambda: mission_from_text(
         mission().text().replace("ros__parameters:", "ros__parameters:" + EVENTS, 1), "scripted"

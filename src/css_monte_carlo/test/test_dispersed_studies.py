@@ -3,6 +3,9 @@
 made of them."""
 
 import json
+import os
+import re
+import signal
 
 import numpy as np
 import pytest
@@ -10,7 +13,8 @@ import pytest
 from css_analysis.errors import StudyError
 from css_analysis.estimator_runs import estimator_runs
 from css_common.drawn_mission import drawn
-from css_common.mission import load_mission
+from css_common.mission import load_mission, mission_from_text
+from css_monte_carlo import worst_case
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.commands.monte_carlo import main
 from css_monte_carlo.direct_flight import fly_directly
@@ -88,6 +92,62 @@ def test_the_worst_flight_is_the_one_that_its_file_flies(study):
     assert run["heading_error_mean_deg"] == pytest.approx(worst.value, rel=1e-9)
     with pytest.raises(StudyError, match="--worst: speed given"):
         find_worst(mission(*DISPERSED), CONFIGURATION, study, 24, "speed")
+
+
+def test_the_worst_flight_of_a_mission_that_steps_node_by_node(tmp_path):
+    """An event that the compiled loop has no place for: the search flies it too, and finds what its file flies."""
+    event = ", events: {held: {time: 20.0, node: mrp_control, action: deactivate}}"
+    text = f"/**: {{ros__parameters: {{extends: okeefe_2013, mission: {{duration: 30.0, period: 1.0}}{event}}}}}"
+    stepped = mission_from_text(text, "held", DISPERSED)
+    found = run_study(stepped, [CONFIGURATION], CASES, tmp_path / "s", threads=2)
+    quantity = "rate_final_deg_s"
+    worst = find_worst(stepped, CONFIGURATION, found, 12, quantity, threads=2)
+    assert worst.flights > 0 and worst.value is not None
+    assert worst.value >= max(found.cases[quantity].to_pylist()) == worst.in_study
+    (run,) = [r for r in estimator_runs(fly_directly(load_mission(worst.mission))) if r["estimator"] == "ekf"]
+    assert run[quantity] == pytest.approx(worst.value, rel=1e-9)
+
+
+def test_ctrl_c_ends_the_search_with_the_worst_so_far(tmp_path, capsys, monkeypatch):
+    flown, fly = [], worst_case._Search._fly
+
+    def interrupted(search, x):
+        flown.append(x)
+        if len(flown) == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+        return fly(search, x)
+
+    monkeypatch.setattr(worst_case._Search, "_fly", interrupted)
+    folder = tmp_path / "s"
+    arguments = [
+        "okeefe_2013",
+        "--cases",
+        "6",
+        "--duration",
+        "120",
+        "--set",
+        "mission.period=1.0",
+        "--out",
+        str(folder),
+    ]
+    options = [
+        "--disperse",
+        "css_array.noise=uniform:0:0.1",
+        "--worst",
+        "--worst-flights",
+        "500",
+        "--gyro",
+        "on",
+        "off",
+    ]
+    assert main([*arguments, *options, "--no-report", "--json"]) == 130
+    printed = capsys.readouterr()
+    told = " ".join(printed.out.split())
+    assert re.search(r"worst heading_error_mean_deg found: .* in the study; \d+ flights more, interrupted", told)
+    assert "Traceback" not in printed.err
+    (worst,) = json.loads(printed.out.splitlines()[-1])["worst"]  # of the second configuration none was looked for
+    assert worst["interrupted"] and worst["flights"] < 100 and worst["value"] >= worst["worst_of_study"]
+    assert worst["mission"] == str(folder / "worst_ekf_gyro.yaml") and load_mission(worst["mission"]).name
 
 
 def test_indices_of_a_known_function():

@@ -9,7 +9,7 @@ are temperature coefficients and no temperature is heard, scales are those at th
 `CalibratedReadings.warning` says so.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from css_common.codec import Sample
 from css_common.component import Finding, Input
 from css_common.mission_extends import sections_alone
 from css_common.mission_file import MissionError
-from css_common.schema import Parameter, Values
+from css_common.schema import Values
 from css_common.sections import MEASURED_FIELD_BIAS, MEASURED_FIELD_MATRIX, MEASURED_GYRO_BIAS
 from css_common.vectors import Vec3, vector_of
 from css_sensors.cells import (
@@ -30,6 +30,7 @@ from css_sensors.cells import (
     MEASURED_SCALES,
     MEASURED_TEMPERATURE,
 )
+from css_sensors.corrections import corrections, given, of_field, of_output, of_rate
 
 if TYPE_CHECKING:
     from css_common.mission import Node
@@ -78,20 +79,9 @@ class CalibratedReadings:
     def __init__(self, values: Values) -> None:
         """Takes the sections cells, gyro and magnetometer, as far as they are there."""
         self.cool = self.warm = 0
-        scales, darks = _given(values, MEASURED_SCALES), _given(values, MEASURED_DARKS)
-        self._coefficients = _given(values, MEASURED_COEFFICIENTS)
-        self._of_cells = bool(len(scales) or len(darks) or len(self._coefficients))
-        if self._of_cells:
-            count = len(values.cells.normals)
-            self._reference = float(values[MEASURED_TEMPERATURE])
-            self._scales = scales if len(scales) else np.ones(count)
-            self._darks = darks if len(darks) else np.zeros(count)
-        bias = _given(values, MEASURED_GYRO_BIAS)
-        self._gyro_bias = np.radians(bias[0]) / 3600.0 if len(bias) else None
-        field_bias, matrix = _given(values, MEASURED_FIELD_BIAS), _given(values, MEASURED_FIELD_MATRIX)
-        self._field_bias = 1e-9 * field_bias[0] if len(field_bias) else np.zeros(3)
-        self._inverse = np.linalg.inv(matrix) if len(matrix) else np.eye(3)
-        self._of_field = bool(len(field_bias) or len(matrix))
+        self._c = corrections(values)
+        self._coefficients = given(values, MEASURED_COEFFICIENTS)
+        self._reference = float(values[MEASURED_TEMPERATURE]) if self._c.of_cells else 0.0
 
     @property
     def warning(self) -> str:
@@ -106,9 +96,9 @@ class CalibratedReadings:
 
     def cells(self, voltages: np.ndarray, temperature: Sample | None = None) -> np.ndarray:
         """Outputs (..., N) at a temperature of the cells; None: nobody knows it."""
-        if not self._of_cells:
+        if not self._c.of_cells:
             return voltages
-        scales = self._scales
+        scales = self._c.scales
         if len(self._coefficients):
             cycles = voltages.size // max(1, voltages.shape[-1])
             if temperature is None:
@@ -116,15 +106,15 @@ class CalibratedReadings:
             else:
                 self.warm += cycles
                 scales = scales * warm_scales(self._coefficients, temperature.temperature, self._reference)
-        return (voltages - self._darks) / scales
+        return np.asarray(of_output(voltages, self._c.darks, scales))
 
     def rates(self, rates_b: np.ndarray) -> np.ndarray:
         """Body rates (..., 3) [rad/s]."""
-        return rates_b if self._gyro_bias is None else rates_b - self._gyro_bias
+        return self._of_each(of_rate, rates_b) if self._c.of_gyro else rates_b
 
     def fields(self, fields_b: np.ndarray) -> np.ndarray:
         """Fields (..., 3) [T]."""
-        return (fields_b - self._field_bias) @ self._inverse.T if self._of_field else fields_b
+        return self._of_each(of_field, fields_b) if self._c.of_field else fields_b
 
     def rate(self, imu: Sample | None) -> tuple[Vec3, bool]:
         """Body rate [rad/s] of a sensor_msgs/Imu and whether it is a measurement.
@@ -133,8 +123,7 @@ class CalibratedReadings:
         """
         if imu is None or imu.angular_velocity_covariance[0] == _NO_ESTIMATE:
             return _NOTHING, False
-        rate_b = imu.angular_velocity
-        return vector_of(rate_b if self._gyro_bias is None else self.rates(rate_b)), True
+        return vector_of(self.rates(imu.angular_velocity)), True
 
     def field(self, field: Sample | None) -> tuple[Vec3, bool]:
         """Field [T] of a sensor_msgs/MagneticField and whether it is a measurement, by the same convention."""
@@ -142,12 +131,8 @@ class CalibratedReadings:
             return _NOTHING, False
         return vector_of(self.fields(field.magnetic_field)), True
 
-
-def _given(values: Values, parameter: Parameter[Any]) -> np.ndarray:
-    """A list of numbers, empty where a component does not have its section."""
-    if parameter not in values:
-        return np.zeros(0)
-    return np.asarray(values[parameter], dtype=np.float64)
+    def _of_each(self, corrected: Callable[..., Any], vectors: np.ndarray) -> np.ndarray:
+        return np.stack(corrected(self._c, *np.moveaxis(vectors, -1, 0)), axis=-1)
 
 
 def calibration_sections(path: str | Path) -> dict[str, dict[str, Any]]:

@@ -10,7 +10,7 @@ from css_common.mission import Mission
 from css_design.budget import measured, propagation
 from css_design.budget.measured import ALL, Errors, Estimate, Split
 from css_design.budget.propagation import Propagated
-from css_design.budget.sources import FILTER, LAYOUT, SOURCES, heard_sources, is_active
+from css_design.budget.sources import FILTER, LAYOUT, SOURCES, heard_sources, is_active, refuse_calibrated
 from css_design.errors import DesignError
 from css_monte_carlo.mission_parts import is_heading, parts_of
 from css_sim.earth_reflectivity import clouds_move
@@ -91,6 +91,7 @@ def budget_of(
 
 
 def _check(mission: Mission) -> None:
+    refuse_calibrated(mission)
     name = mission.values.graph.estimator
     node = next((node for node in mission.nodes if node.name == name), None)
     if node is None or not is_heading(node):

@@ -18,7 +18,15 @@ from css_analysis.flight_metrics import acquisition
 from css_common.mission import Mission
 from css_design.budget.measured import Estimate, bound
 from css_design.budget.open_loop import Estimates, Path, estimates, path_of, readings
-from css_design.budget.sources import FILTER, LAYOUT, heard_sources, is_active, seeing_everywhere, without
+from css_design.budget.sources import (
+    FILTER,
+    LAYOUT,
+    heard_sources,
+    is_active,
+    refuse_calibrated,
+    seeing_everywhere,
+    without,
+)
 from css_design.errors import DesignError
 from css_estimation.sun.sun_heading import VALIDITY_NONE
 from css_monte_carlo.mission_flight import MissionFlight
@@ -107,6 +115,7 @@ def _mission_of(log: FlightLog) -> Mission:
     if log.mission is None:
         notes = f" ({log.notes[0]})" if log.notes else ""
         raise DesignError(f"{log.origin}: holds no mission{notes}, expected one that was recorded with it")
+    refuse_calibrated(log.mission)
     name = log.mission.values.graph.estimator
     if name not in log.estimates:
         raise DesignError(f"{log.origin}: holds no estimates of {name}, expected the topic {name}/sun_estimate")

@@ -7,7 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.mission import Mission, MissionError
+from css_design.errors import DesignError
 from css_monte_carlo.mission_parts import Parts, parts_of
+from css_sensors.calibrated_readings import is_calibrated
 from css_sensors.cells import CELLS, NORMALS
 
 LAYOUT = "layout"
@@ -77,6 +79,19 @@ def heard_sources(mission: Mission) -> tuple[Source, ...]:
     """Sources of the sensors that a mission has."""
     parts = parts_of(mission)
     return tuple(source for source in SOURCES if getattr(parts, source.part) is not None)
+
+
+def refuse_calibrated(mission: Mission) -> None:
+    """Raises where readings are corrected by a calibration: what it leaves of an error is not split.
+
+    Raises:
+        DesignError: they are.
+    """
+    if any(is_calibrated(node.values) for node in mission.nodes):
+        raise DesignError(
+            f"{mission.origin}: cells.measured, gyro.measured or magnetometer.measured given, but sensors are split "
+            "that nobody has calibrated; expected a mission without them, with the errors that the calibration leaves"
+        )
 
 
 def known_response(mission: Mission) -> bool:

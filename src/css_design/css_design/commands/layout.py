@@ -20,11 +20,13 @@ _EXAMPLES = (
     "okeefe_2013 --cells 4-10 --out layouts",
     "cubesat_3u_safe --faces +x -x +y -y --tilt 20 --cells 6-8 --json",
     "okeefe_2013 --cells 8 --pointing 0 --weights 1,0,0",
+    "okeefe_2013 --cells 8 --pointing 0.8 --weights 1,0,0.5,0.5",
     "cubesat_3u_safe --structure docs/samples/cubesat_boxes.yaml --views 90 120",
 )
 _NOTES = """\
 Errors are root mean squares over the two axes of the heading. mean: over the scenes; worst: of all; failed: the mean
-with the one cell dead whose loss costs most. A search makes A mean + B worst + C failed small (--weights A,B,C).
+with the one cell dead whose loss costs most; worst 5 %: the mean of the worst scenes that have a twentieth of the
+weight. A search makes A mean + B worst + C failed + D worst 5 % small (--weights A,B,C,D).
 Ctrl-C ends it with the best so far."""
 
 
@@ -53,8 +55,8 @@ def _parser() -> CommandParser:
     add(
         "--weights",
         default="1,0.1,0.5",
-        metavar="A,B,C",
-        help="weights of mean, worst and failed (default: %(default)s)",
+        metavar="A,B,C[,D]",
+        help="weights of mean, worst, failed and worst 5 %% (default: %(default)s)",
     )
     add(
         "--prior",

@@ -51,6 +51,7 @@ def error_object(error: HeadingError) -> dict[str, float]:
         "failed_mean_deg": math.degrees(error.failed),
         "failed_worst_deg": math.degrees(error.failed_worst),
         "unseen_share": error.unseen,
+        "tail_mean_deg": math.degrees(error.tail),
     }
 
 

@@ -25,6 +25,9 @@ from css_common.vectors import Vec3, add, angle_between, axes_across, dot, row, 
 from css_design.layout.readings import Readings
 from css_design.layout.scenes import Scenes
 
+TAIL = 0.05
+"""Share of the scenes that count as the tail."""
+
 _STEPS = 4
 _LONGEST_STEP = 0.4  # [rad]
 _A_GUESS = 0.5 * math.pi  # [rad] mean error of any direction
@@ -45,13 +48,14 @@ class HeadingError(NamedTuple):
     failed: float  # largest mean with any one cell dead
     failed_worst: float  # largest of all scenes with any one cell dead
     unseen: float  # share of the weight of the scenes in which no cell sees the Sun
+    tail: float  # mean of the worst scenes that have a twentieth of the weight
 
 
 def heading_error(
     normals_b: np.ndarray, readings: Readings, scenes: Scenes, knowledge: Knowledge, chosen: np.ndarray
 ) -> HeadingError:
     """Error of a layout of some cells (N,), numbers of rows of `readings`."""
-    out, room = np.zeros(5), np.zeros((len(chosen), 5))
+    out, room, errors = np.zeros(5), np.zeros((len(chosen), 5)), np.zeros(len(scenes.weight))
     _measure(
         np.ascontiguousarray(normals_b),
         readings.seen,
@@ -61,9 +65,17 @@ def heading_error(
         knowledge,
         np.asarray(chosen, dtype=np.int64),
         room,
+        errors,
         out,
     )
-    return HeadingError(*map(float, out))
+    return HeadingError(*map(float, out), tail_mean(errors, scenes.weight))
+
+
+def tail_mean(errors: np.ndarray, weight: np.ndarray, share: float = TAIL) -> float:
+    """Mean of the largest errors (S,) that have a share of the weight: expected shortfall."""
+    order = np.argsort(-errors, kind="stable")
+    larger = np.cumsum(weight[order]) - weight[order]
+    return float(np.clip(share - larger, 0.0, weight[order]) @ errors[order] / share)
 
 
 @kernel
@@ -84,7 +96,7 @@ def _error(estimate: Vec3, sun_b: Vec3, variance: float) -> float:
 
 
 @outer_kernel
-def _measure(normals_b, seen, outputs, suns_b, weight, knowledge: Knowledge, chosen, room, out) -> None:
+def _measure(normals_b, seen, outputs, suns_b, weight, knowledge: Knowledge, chosen, room, errors, out) -> None:
     count = chosen.shape[0]
     before, per_cell = 1.0 / knowledge.prior**2, 1.0 / knowledge.sigma**2
     failed = np.zeros(count)
@@ -112,6 +124,7 @@ def _measure(normals_b, seen, outputs, suns_b, weight, knowledge: Knowledge, cho
             if step < _STEPS:
                 estimate, _ = _stepped(estimate, a, c, j11, j12, j22, b1, b2)
         error = _error(estimate, sun_b, (j11 + j22) / (j11 * j22 - j12 * j12)) if lit else _A_GUESS
+        errors[s] = error
         out[0] += weight[s] * error
         out[1] = max(out[1], error)
         if lit == 0:

@@ -31,10 +31,12 @@ class Aims(NamedTuple):
     mean: float = 1.0
     worst: float = 0.1
     failed: float = 0.5
+    tail: float = 0.0
 
     def of(self, error: HeadingError) -> float:
         """What a search makes small."""
-        return math.degrees(self.mean * error.mean + self.worst * error.worst + self.failed * error.failed)
+        parts = (self.mean * error.mean, self.worst * error.worst, self.failed * error.failed, self.tail * error.tail)
+        return math.degrees(sum(parts))
 
 
 class LayoutJudge:
@@ -64,14 +66,23 @@ class LayoutJudge:
         if array is None:
             raise DesignError(f"{mission.origin}: graph.nodes has no css_sim/css_array, no cells to lay out")
         if np.any(array.values.collar.axis):
-            raise DesignError(f"{mission.origin}: collar.axis: its cells have their place, expected a mission without")
+            raise DesignError(
+                f"{mission.origin}: {array.name}.collar.axis: a collar shades the cells that stand in it, none of "
+                "those that are placed anew; expected a mission without, by "
+                f"--set {array.name}.collar.axis=0,0,0 --set {array.name}.collar.cells=, and the collar as a part of "
+                "--structure"
+            )
         self.clip_normal_b = np.asarray(array.values.cells.clip_normal)
         self._scenes: Scenes = scenes_of(mission, pointing)
         self._chain = layout_of_mission(mission).chain
         self._earthlit = bool(array.values.albedo.enabled)
         if len(self._chain.responses) > 1:
+            curves = np.reshape(array.values.response.outputs, (len(self._chain.responses), -1))
+            mean = ",".join(f"{output:.4g}" for output in curves.mean(axis=0))
             raise DesignError(
-                f"{mission.origin}: response.outputs: one for each cell, expected one that all cells share"
+                f"{mission.origin}: {array.name}.response.outputs: {len(self._chain.responses)} curves given, one for "
+                "each cell that is there; expected one for all, as a cell that is placed anew has none, such as their "
+                f"mean by --set {array.name}.response.outputs={mean}"
             )
         self.own = Cells(np.asarray(mission.values.cells.normals), _views_deg(array.values))
         self.own_blocked = blocked_directions(array.values)

@@ -167,6 +167,7 @@ def _estimator(design: Design) -> Iterator[Entry]:
         )
     if name == "sun_filter":
         yield Entry("noise", max(noise, 1e-6), "[computed] that of the cells")
+        yield Entry("output_low", 0.0, "the converter ends there, and with it the noise of dark cells")
         yield Entry("gain_sigma", asked["cell_scale"], "[computed] what nobody has calibrated")
         yield Entry("tilt_sigma_deg", asked["cell_tilt"], "[computed] likewise")
         yield Entry("rate.start_deg_s", max(asked["tip_off"], 0.1), "[computed] tip-off")

@@ -7,6 +7,7 @@ from typing import Any
 
 from css_design.errors import DesignError
 from css_design.new_mission.directions import Vector, direction
+from css_sensors.cells import MOST_CELLS
 
 NONE = "none"
 """Word for what a spacecraft does not have."""
@@ -51,7 +52,10 @@ def directions(text: str) -> tuple[Vector, ...]:
     """Reads directions with commas between them; `all` is all six faces."""
     if text.strip() == "all":
         text = "+x,-x,+y,-y,+z,-z"
-    return tuple(direction(word) for word in text.split(","))
+    words = text.split(",")
+    if len(words) > MOST_CELLS:
+        raise DesignError(f"{len(words)} directions given, expected 1 to {MOST_CELLS}")
+    return tuple(direction(word) for word in words)
 
 
 def word(*choices: str) -> Parser:

@@ -22,7 +22,7 @@ from css_design.layout.search import LayoutSearch
 from css_design.layout.structure import read_structure
 from css_sensors.cells import MOST_CELLS
 
-_COLUMNS = ("mean", "worst", "failed\nmean", "failed\nworst")
+_COLUMNS = ("mean", "worst", "failed\nmean", "failed\nworst", "worst\n5 %")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -103,8 +103,8 @@ def _aims(text: str) -> Aims:
         weights = [float(part) for part in text.split(",")]
     except ValueError:
         weights = []
-    if len(weights) != 3 or not all(0.0 <= w < math.inf for w in weights) or not any(weights):
-        raise DesignError(f"--weights: {text} given, expected three numbers from 0 on, such as 1,0.1,0.5")
+    if len(weights) not in (3, 4) or not all(0.0 <= w < math.inf for w in weights) or not any(weights):
+        raise DesignError(f"--weights: {text} given, expected three or four numbers from 0 on, such as 1,0.1,0.5")
     return Aims(*weights)
 
 
@@ -125,5 +125,5 @@ def _print(points: list[Point], own_cells: int, own: HeadingError, own_cost: flo
 
 
 def _figures(error: HeadingError) -> list[str]:
-    degrees = [math.degrees(e) for e in (error.mean, error.worst, error.failed, error.failed_worst)]
+    degrees = [math.degrees(e) for e in (error.mean, error.worst, error.failed, error.failed_worst, error.tail)]
     return [*(f"{e:.2f}" for e in degrees), f"{100.0 * error.unseen:.1f}%"]

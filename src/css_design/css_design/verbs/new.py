@@ -40,7 +40,12 @@ def run(options: argparse.Namespace) -> int:
     asked, origin = read_items({**given, **answers}, options.template)
     origin |= dict.fromkeys(answers, "answered")
     made = new_mission(options.name, asked, origin)
-    _write(path, made.text, options.overwrite)
+    try:
+        _write(path, made.text, options.overwrite)
+    except FileExistsError as error:
+        raise DesignError(_is_there(path)) from error
+    except OSError as error:
+        raise DesignError(f"{path}: cannot be written: {error.strerror}") from error
     _tell(made, path)
     if options.json:
         print(json.dumps(_as_object(made, path), allow_nan=False))
@@ -59,8 +64,12 @@ def _path(options: argparse.Namespace) -> Path:
     if path.suffix not in _SUFFIXES:
         raise DesignError(f"--out: {path} given, expected a file that ends in .yaml")
     if path.exists() and not options.overwrite:
-        raise DesignError(f"{path}: is there already, expected a new file, another --out or --overwrite")
+        raise DesignError(_is_there(path))
     return path
+
+
+def _is_there(path: Path) -> str:
+    return f"{path}: is there already, expected a new file, another --out or --overwrite"
 
 
 def _write(path: Path, text: str, overwrite: bool) -> None:

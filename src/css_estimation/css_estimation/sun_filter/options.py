@@ -121,6 +121,16 @@ class CellErrors(NamedTuple):
     """Variances of what the model of the cells leaves out."""
 
     noise: float = made(square, real("noise", 0.006, "-", "white noise of a cell, 1 sigma", low=1e-6, high=1.0))
+    output_low: float = given(
+        real(
+            "output_low",
+            -10.0,
+            "-",
+            "lowest output that the cells' converter gives, whose noise ends there; far below 0: nothing ends",
+            low=-10.0,
+            high=1.0,
+        )
+    )
     common: float = made(
         square,
         real("common_noise", 0.005, "-", "white error of the output common to all cells, 1 sigma", low=0.0, high=1.0),
