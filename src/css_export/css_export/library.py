@@ -20,11 +20,14 @@ from css_export.flown import MEMORY, PARAMETERS, STATE, Function
 from css_export.header import header_text
 from css_export.layout import pack
 from css_export.limits import Limit, limits_of
-from css_export.machine_code import built
+from css_export.machine_code import Built, built
 from css_export.names import prefix_of
+from css_export.shipped_mathematics import EXACT, NAME, notice, with_mathematics
 from css_export.targets import Target
 
 _RELEASED = "css_estimation"  # whose version is that of Sunpoint
+TARGET, MUSL = "target", "musl"
+WHOSE = {TARGET: "of the C library that it is linked with", MUSL: f"of {NAME}"}
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Library:
         version: of Sunpoint, of the compilers, and the hash of the mission.
         limits: of its parameters.
         texts: its modules of intermediate code.
+        mathematics: TARGET or MUSL: whose functions it calls.
     """
 
     function: Function
@@ -59,6 +63,7 @@ class Library:
     interface: Interface
     limits: list[Limit]
     texts: tuple[str, ...]
+    mathematics: str = TARGET
 
     @property
     def exported(self) -> tuple[str, ...]:
@@ -72,10 +77,22 @@ class Library:
         Raises:
             ExportError: something in it must not fly, or there is no code for such a target.
         """
-        made = built(self.function.name, self.texts, self.exported, target)
+        made = self._built(target)
         stack = made.stacks[f"{self.prefix}_step"]
         packed = archive({"step.o": made.object})
         return MachineCode(target, made.object, packed, contents(made.object), stack)
+
+    def _built(self, target: Target) -> Built:
+        if self.mathematics == TARGET:
+            return built(self.function.name, self.texts, self.exported, target)
+        also: set[str] = set()
+        while True:
+            texts = with_mathematics(self.texts, also)
+            made = built(self.function.name, texts, self.exported, target)
+            more = set(contents(made.object).missing) & EXACT - also
+            if not more:
+                return made
+            also |= more
 
     def header(self) -> str:
         """`sunpoint_NAME.h`."""
@@ -91,15 +108,20 @@ def state_values(function: Function, arguments: tuple[Any, ...]) -> tuple[Any, .
     return tuple(value for value, role in zip(arguments, function.roles, strict=True) if role in (STATE, MEMORY))
 
 
-def made_library(mission: Mission, function: Function) -> Library:
+def made_library(mission: Mission, function: Function, mathematics: str = TARGET) -> Library:
     """Compiles a kernel of a mission.
+
+    Args:
+        mission: that it flies in.
+        function: the kernel.
+        mathematics: TARGET: sine and others are the C library's that the image is linked with; MUSL: they are in it.
 
     Raises:
         ExportError: it cannot be exported.
     """
     compiled: Compiled = compile_function(function)
     interface, prefix = compiled.interface, prefix_of(function.name)
-    version = version_of(mission, function)
+    version = version_of(mission, function, mathematics)
     structs = interface.structs
     p = function.sample[function.places(PARAMETERS)[0]]
     limits = limits_of(structs[PARAMETERS], p)
@@ -111,15 +133,15 @@ def made_library(mission: Mission, function: Function) -> Library:
         limits_text(prefix, limits),
         version_text(prefix, version),
     )
-    return Library(function, prefix, version, interface, limits, texts)
+    return Library(function, prefix, version, interface, limits, texts, mathematics)
 
 
-def version_of(mission: Mission, function: Function) -> str:
+def version_of(mission: Mission, function: Function, mathematics: str) -> str:
     """What a library says of itself: what it was made of and by."""
     digest = hashlib.sha256(mission.text().encode()).hexdigest()
     return (
         f"Sunpoint {_release()}, {function.component} of mission {mission.name}, sha256 of the mission {digest}, "
-        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}"
+        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, mathematics {WHOSE[mathematics]}"
     )
 
 
@@ -141,6 +163,8 @@ def write_library(library: Library, codes: list[MachineCode], folder: Path) -> l
         folder / f"{library.prefix}.h": library.header().encode(),
         folder / f"{library.prefix}_main.c": library.main().encode(),
     }
+    if library.mathematics == MUSL:
+        files[folder / "COPYRIGHT.musl"] = notice().encode()
     for code in codes:
         place = folder / code.target.name
         place.mkdir(exist_ok=True)

@@ -66,7 +66,9 @@ def built(name: str, texts: Iterable[str], exported: Iterable[str], target: Targ
     done = subprocess.run([sys.executable, "-m", __name__], input=asked.encode(), capture_output=True, check=False)
     said = done.stderr.decode(errors="replace")
     if done.returncode != 0:
-        reason = said.strip().splitlines()[-1] if said.strip() else f"LLVM ended with {done.returncode}"
+        lines = [line for line in said.splitlines() if line.strip(" ^~")]
+        reason = next((line for line in lines if "error:" in line), lines[-1] if lines else "")
+        reason = reason or f"LLVM ended with {done.returncode}"
         raise ExportError(f"{name} for {target.name}: {reason}")
     answer = json.loads(done.stdout)
     if "refused" in answer:

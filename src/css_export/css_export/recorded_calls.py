@@ -123,8 +123,21 @@ def packed_output(function: Function, struct: Struct, arguments: tuple[Any, ...]
     return pack(struct, written + given)
 
 
-def listen(reader: BagReader, mission: Mission, library: Library, most: int | None = None) -> Calls:
+def listen(
+    reader: BagReader,
+    mission: Mission,
+    library: Library,
+    most: int | None = None,
+    through: Callable[[Callable[..., Any]], Callable[..., Any]] | None = None,
+) -> Calls:
     """The calls of a library's kernel in a recorded flight.
+
+    Args:
+        reader: of the recording.
+        mission: that flew.
+        library: of the kernel.
+        most: steps.
+        through: gives what is asked in the place of the kernel.
 
     Raises:
         ExportError: the recording lacks the inputs of the component.
@@ -132,6 +145,8 @@ def listen(reader: BagReader, mission: Mission, library: Library, most: int | No
     listener = Listener(library, most)
     node = mission.node(library.function.component)
     stepper = Stepper(node.component, node.name, node.canonical, mission.events, mission.epoch_ns)
+    if through is not None:
+        attach(stepper.component, library.function.attribute, through)
     attach(stepper.component, library.function.attribute, listener.around)
     flown = _recorded(reader, node)
     for stamp_ns, received in _cycles(reader, node, stepper):

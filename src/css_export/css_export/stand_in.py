@@ -161,12 +161,12 @@ def stand_in(node: Node, file: str) -> type[Component]:
     path = Path(file)
     if not path.is_file():
         raise ExportError(f"--component {node.name}: {file}: no such file")
-    kind = _elf_kind(path)
+    _elf_kind(path)
     if path.suffix == ".so":
         loaded_step(path, prefix_of(function.name))
 
     def around(kernel: Callable[..., Any]) -> Callable[..., Any]:
-        return _Step(function, kernel, path, kind)
+        return library_step(function, kernel, path)
 
     class StandIn(node.component):  # type: ignore[name-defined]
         """A component with a library in it."""
@@ -181,6 +181,15 @@ def stand_in(node: Node, file: str) -> type[Component]:
     StandIn.__name__, StandIn.__module__ = node.component.__name__, node.component.__module__
     StandIn.__doc__ = node.component.__doc__
     return StandIn
+
+
+def library_step(function: Function, kernel: Callable[..., Any], file: Path) -> Callable[..., Any]:
+    """What a component calls in the place of its kernel: a library that is asked for each step.
+
+    Raises:
+        ExportError: the file is no library or program, cannot be loaded or started, or lacks the step.
+    """
+    return _Step(function, kernel, file, _elf_kind(file))
 
 
 def _elf_kind(file: Path) -> int:

@@ -21,8 +21,8 @@ from css_export.library import MachineCode, made_library, write_library
 from css_export.machine_code import built
 from css_export.programs import compiled_object, compiled_program, run_program, why_not
 from css_export.recorded_calls import listen
+from css_export.report import Row
 from css_export.targets import TARGETS
-from css_export.verbs.export import Row
 from css_export.verification import Verdict, judged, relative_difference, run_library
 from css_recording.bag_reader import BagReader
 
