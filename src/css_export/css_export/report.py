@@ -25,6 +25,7 @@ class Row:
     verdict: Verdict | None = None
     why_not: str | None = None
     differing: dict[str, float] | None = None  # functions of the C library, by the share of arguments
+    instructions: int | None = None  # of the longest step, with those of all that it calls
     messages: int | None = None  # of the component over the recording, as made anew
     as_recorded: int | None = None  # of them, those that are the bytes in the recording
 
@@ -118,6 +119,7 @@ def result(row: Row) -> dict[str, Any]:
         "linked": contents.missing,
         "not_run": row.why_not,
         "differing_functions": row.differing,
+        "most_instructions": row.instructions,
         "mathematics": row.library.mathematics,
         "messages": row.messages,
         "messages_as_recorded": row.as_recorded,

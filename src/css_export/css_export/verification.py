@@ -9,7 +9,7 @@ from pathlib import Path
 from css_export.flown import OUTPUT
 from css_export.layout import Struct, leaves
 from css_export.library import Library
-from css_export.programs import compiled_program, run_program
+from css_export.programs import compiled_program, counted_run
 from css_export.recorded_calls import Calls
 from css_export.targets import Target
 
@@ -36,8 +36,10 @@ class Verdict:
         return max(self.largest.values(), default=0.0)
 
 
-def run_library(library: Library, target: Target, folder: Path, calls: Calls) -> bytes:
-    """What the program of a library writes for the calls of a flight.
+def run_library(library: Library, target: Target, folder: Path, calls: Calls) -> tuple[bytes, int | None]:
+    """What the program of a library writes for the calls of a flight, and instructions of its longest step.
+
+    Instructions are those of the step with all that it calls; None where the emulator counts none.
 
     Raises:
         ToolError: it cannot be compiled or run here.
@@ -45,8 +47,8 @@ def run_library(library: Library, target: Target, folder: Path, calls: Calls) ->
     place = folder / target.name
     program = place / f"{library.prefix}_main"
     source, packed = folder / f"{library.prefix}_main.c", place / f"lib{library.prefix}.a"
-    compiled_program(target, [source], [packed], program)
-    return run_program(target, program, bytes(calls.stream))
+    compiled_program(target, [source], [packed], program, f"{library.prefix}_step")
+    return counted_run(target, program, bytes(calls.stream))
 
 
 def judged(library: Library, calls: Calls, written: bytes) -> Verdict:

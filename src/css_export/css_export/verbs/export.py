@@ -112,7 +112,8 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
         if row.why_not is None:
             _tell(f"{library.function.name}: {calls.steps} steps on {row.code.target.name}")
             try:
-                row.verdict = judged(library, calls, run_library(library, row.code.target, place, calls))
+                written, row.instructions = run_library(library, row.code.target, place, calls)
+                row.verdict = judged(library, calls, written)
                 if row.verdict.equal != row.verdict.steps:
                     row.differing = differing_functions(row.code.contents.missing, row.code.target, place)
             except ToolError as error:
