@@ -15,7 +15,7 @@ from css_export.archive import archive
 from css_export.c_main import main_text
 from css_export.data_text import constant_text, init_text, limits_text, step_text, version_text
 from css_export.elf import Contents, contents
-from css_export.entry import Compiled, Interface, compile_function
+from css_export.entry import Compiled, Interface, Native, compile_function
 from css_export.flown import MEMORY, PARAMETERS, STATE, Function
 from css_export.header import header_text
 from css_export.layout import pack
@@ -54,6 +54,7 @@ class Library:
         version: of Sunpoint, of the compilers, and the hash of the mission.
         limits: of its parameters.
         texts: its modules of intermediate code.
+        native: the kernel behind the same interface, as numba compiles it for this machine.
         mathematics: TARGET or MUSL: whose functions it calls.
     """
 
@@ -63,6 +64,7 @@ class Library:
     interface: Interface
     limits: list[Limit]
     texts: tuple[str, ...]
+    native: Native
     mathematics: str = TARGET
 
     @property
@@ -133,7 +135,7 @@ def made_library(mission: Mission, function: Function, mathematics: str = TARGET
         limits_text(prefix, limits),
         version_text(prefix, version),
     )
-    return Library(function, prefix, version, interface, limits, texts, mathematics)
+    return Library(function, prefix, version, interface, limits, texts, compiled.native, mathematics)
 
 
 def version_of(mission: Mission, function: Function, mathematics: str) -> str:

@@ -32,6 +32,7 @@ class Calls:
 
     Attributes:
         stream: as `c_main` describes it.
+        inputs: struct of inputs of each step.
         outputs: struct of outputs after each step.
         hashes: of the state after it.
         messages: that the component gave, and of them those that are the bytes that were recorded.
@@ -39,6 +40,7 @@ class Calls:
     """
 
     stream: bytearray = field(default_factory=bytearray)
+    inputs: list[bytes] = field(default_factory=list)
     outputs: list[bytes] = field(default_factory=list)
     hashes: list[int] = field(default_factory=list)
     messages: int = 0
@@ -103,7 +105,8 @@ class Listener:
         if parameters != self._parameters:
             calls.stream += word(PARAMETERS) + parameters
             self._parameters = parameters
-        calls.stream += word(STEP) + self._packed(INPUT, arguments)
+        calls.inputs.append(bytes(self._packed(INPUT, arguments)))
+        calls.stream += word(STEP) + calls.inputs[-1]
 
     def _note_after(self, arguments: tuple[Any, ...], result: Any) -> None:
         function, calls = self._library.function, self.calls

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What came of an export: a row for each library and target, as a table and as JSON."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ class Row:
     why_not: str | None = None
     differing: dict[str, float] | None = None  # functions of the C library, by the share of arguments
     instructions: int | None = None  # of the longest step, with those of all that it calls
+    time_ratio: float | None = None  # of a step here, over that of the kernel that the nodes call
     messages: int | None = None  # of the component over the recording, as made anew
     as_recorded: int | None = None  # of them, those that are the bytes in the recording
 
@@ -38,7 +39,9 @@ class Row:
         return self.verdict.equal == self.verdict.steps or traced
 
 
-def print_report(rows: list[Row], verified: bool, folder: Path, lines: Sequence[str], missing: Sequence[str]) -> None:
+def print_report(
+    rows: list[Row], verified: bool, folder: Path, lines: Sequence[str], missing: Mapping[str, str]
+) -> None:
     """Prints the table, what was not run, and what remains to be linked."""
     console = Console(highlight=False)
     table = ReadableTable("C libraries, sizes in bytes")
@@ -62,6 +65,8 @@ def print_report(rows: list[Row], verified: bool, folder: Path, lines: Sequence[
             why = f"its C library gives other bits than that of this machine: {told}" if told else "no function of the "
             why += "" if told else "C library that it links gives other bits; the reason lies in the code"
             console.print(f"{row.library.function.name} on {row.code.target.name}: {why}", soft_wrap=True)
+        if row.instructions is not None or row.time_ratio is not None:
+            console.print(_effort(row), soft_wrap=True)
     for line in lines:
         console.print(line, soft_wrap=True)
     for library in {row.library.prefix: row.library for row in rows}.values():
@@ -70,9 +75,18 @@ def print_report(rows: list[Row], verified: bool, folder: Path, lines: Sequence[
             if row.library is library:
                 linked = ", ".join(row.code.contents.missing) or "nothing"
                 console.print(f"{library.function.name} on {row.code.target.name} links {linked}", soft_wrap=True)
-    for name in missing:
-        console.print(f"{name}: left out, it has no compiled function that flies", soft_wrap=True)
+    for name, reason in missing.items():
+        console.print(f"{name}: left out: {reason}", soft_wrap=True)
     console.print(f"written: {folder}", soft_wrap=True)
+
+
+def _effort(row: Row) -> str:
+    """What the longest of the steps took on an emulated machine, or all of them on this one."""
+    where = f"{row.library.function.name} on {row.code.target.name}"
+    if row.instructions is not None:
+        counted = "with those of what is linked, counted in forties"
+        return f"{where}: {row.instructions} instructions in the longest of these steps, {counted}"
+    return f"{where}: a step takes {row.time_ratio:.2f} of the time of the kernel that the node calls"
 
 
 def _print_flight(console: Console, row: Row) -> None:
@@ -120,6 +134,7 @@ def result(row: Row) -> dict[str, Any]:
         "not_run": row.why_not,
         "differing_functions": row.differing,
         "most_instructions": row.instructions,
+        "time_to_kernel": row.time_ratio,
         "mathematics": row.library.mathematics,
         "messages": row.messages,
         "messages_as_recorded": row.as_recorded,

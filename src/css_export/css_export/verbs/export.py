@@ -19,6 +19,7 @@ from css_export.mathematics import differing_functions
 from css_export.programs import can_link, shared_library, why_not
 from css_export.recorded_calls import Calls, listen
 from css_export.report import Row, print_report, result
+from css_export.speed import time_ratio
 from css_export.stand_in import library_step
 from css_export.targets import HOST, TARGETS, Target, target_of
 from css_export.verification import judged, run_library
@@ -54,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
         rows += of_library
         if options.verify is not None:
             lines += _verify(of_library, options, mission, place)
-    missing = [] if options.components else left_out(mission)
+    missing = {} if options.components else left_out(mission)
     print_report(rows, options.verify is not None, folder, lines, missing)
     if options.json:
         print(json.dumps({"mission": mission.name, "results": [result(row) for row in rows], "left_out": missing}))
@@ -103,7 +104,7 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
     library = rows[0].library
     _tell(f"{library.function.name}: the calls of the flight")
     with tempfile.TemporaryDirectory() as folder, BagReader(options.verify) as reader:
-        through = _through(library, Path(folder)) if library.mathematics == MUSL else None
+        through = reference_of(library, Path(folder)) if library.mathematics == MUSL else None
         calls = listen(reader, mission, library, options.steps, through)
     lines = _shortcomings(library, calls, options)
     for row in rows:
@@ -114,6 +115,9 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
             try:
                 written, row.instructions = run_library(library, row.code.target, place, calls)
                 row.verdict = judged(library, calls, written)
+                shared = place / HOST / f"lib{library.prefix}.so"
+                if row.code.target.name == HOST and shared.is_file():
+                    row.time_ratio = time_ratio(library, shared, calls)
                 if row.verdict.equal != row.verdict.steps:
                     row.differing = differing_functions(row.code.contents.missing, row.code.target, place)
             except ToolError as error:
@@ -121,7 +125,7 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
     return lines
 
 
-def _through(library: Library, folder: Path) -> Callable[[Any], Any]:
+def reference_of(library: Library, folder: Path) -> Callable[[Any], Any]:
     """What puts the library itself, on this machine, in the place of the kernel: that has another mathematics.
 
     Raises:
