@@ -126,7 +126,8 @@ linked comes to it. Loops are bounded by the numbers of cells and wheels and of 
 ## `{prefix}_main.c`
 
 Reads records from standard input, each a word of 64 bits and what belongs to it: 1, then `{prefix}_in`: one step;
-2: the state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks. For each step it writes
+2: the state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks; 4, then the state: from
+there on; 5: it writes `{prefix}_layout`, the number of the structs of the header. For each step it writes
 `{prefix}_out` and a hash of the state (`hash_of_state`), with any argument the state itself.
 `make TARGET={codes[0].target.name}` builds it.
 {_bare(codes)}"""

@@ -5,8 +5,9 @@ Numbers are `double`, `float` and integers of a stated width, flags are bytes of
 same struct has the same bytes under every ABI for which Sunpoint exports; generated code checks its size.
 """
 
+import hashlib
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -238,3 +239,13 @@ def leaves(layout: Layout, name: str = "", at: int = 0) -> Iterator[tuple[str, S
     else:
         for field in layout.fields:
             yield from leaves(field.layout, f"{name}.{field.name}" if name else field.name, at + field.offset)
+
+
+def layout_number(structs: Mapping[str, Struct]) -> int:
+    """A number of 63 bits for what structs are: names, kinds and offsets of their members; never 0."""
+    digest = hashlib.sha256()
+    for role, layout in sorted(structs.items()):
+        digest.update(f"{role} {layout.size}\n".encode())
+        for name, scalar, at in leaves(layout):
+            digest.update(f"{name} {scalar.code} {at}\n".encode())
+    return int.from_bytes(digest.digest()[:8], "big") >> 1 | 1

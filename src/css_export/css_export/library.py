@@ -18,7 +18,7 @@ from css_export.elf import Contents, contents
 from css_export.entry import Compiled, Interface, Native, compile_function
 from css_export.flown import MEMORY, PARAMETERS, STATE, Function
 from css_export.header import header_text
-from css_export.layout import pack
+from css_export.layout import layout_number, pack
 from css_export.limits import Limit, limits_of
 from css_export.machine_code import Built, built
 from css_export.names import prefix_of
@@ -70,7 +70,7 @@ class Library:
     @property
     def exported(self) -> tuple[str, ...]:
         """Symbols that others may link."""
-        names = ("step", "init", "check", "mission", "limits", "version")
+        names = ("step", "init", "check", "mission", "limits", "version", "layout")
         return tuple(f"{self.prefix}_{name}" for name in names)
 
     def for_target(self, target: Target) -> MachineCode:
@@ -102,7 +102,7 @@ class Library:
 
     def main(self) -> str:
         """`sunpoint_NAME_main.c`."""
-        return main_text(self.prefix)
+        return main_text(self.prefix, self.interface.structs[STATE].size)
 
 
 def state_values(function: Function, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -134,6 +134,7 @@ def made_library(mission: Mission, function: Function, mathematics: str = TARGET
         constant_text(f"{prefix}_mission", structs[PARAMETERS], pack(structs[PARAMETERS], p)),
         limits_text(prefix, limits),
         version_text(prefix, version),
+        f"@{prefix}_layout = constant i64 {layout_number(structs)}\n",
     )
     return Library(function, prefix, version, interface, limits, texts, compiled.native, mathematics)
 
