@@ -61,8 +61,11 @@ static void fault(void)
     exit(1);
 }}
 
-__attribute__((section(".vectors"), used)) static void (*const vectors[16])(void) = {{
-    (void (*)(void))top_of_stack, reset, fault, fault, fault, fault, fault}};
+static const struct {{
+    uint32_t *stack;
+    void (*handlers[15])(void);
+}} vectors __attribute__((section(".vectors"), used)) = {{
+    top_of_stack, {{reset, fault, fault, fault, fault, fault, 0, 0, 0, 0, 0, 0, 0, 0, 0}}}};
 
 __attribute__((constructor)) static void redirect(void)
 {{
@@ -107,25 +110,44 @@ __attribute__((destructor)) static void tell(void)
 """
 
 
-def image_command(target: Target, image: Path, counted: str = "") -> list[str]:
+def write_machine(place: Path) -> None:
+    """Writes the start of an image and the memory of the machine, `start.c` and `machine.ld`.
+
+    Raises:
+        OSError: they cannot be written.
+    """
+    for name, text in (("start.c", _START), ("machine.ld", _SCRIPT)):
+        (place / name).write_text(f"/* SPDX-License-Identifier: Apache-2.0 */{text}", encoding="utf-8")
+
+
+def machine_flags(place: str) -> list[str]:
+    """What the compiler is told to link an image, with the files of `write_machine` in a folder."""
+    return [*_SPECS, "-T", f"{place}/machine.ld", f"{place}/start.c"]
+
+
+def run_flags(target: Target, image: str) -> list[str]:
+    """The command that runs an image, which reads `in.bin` and writes `out.bin` where it is run."""
+    command = [target.emulator, "-M", target.machine, "-nographic", "-monitor", "none", "-serial", "none"]
+    return [*command, "-icount", "shift=0", "-semihosting-config", "enable=on,target=native", "-kernel", image]
+
+
+def image_command(image: Path, counted: str = "") -> list[str]:
     """Writes what an image needs beside its own sources, and what its compiler is to be told.
 
     Args:
-        target: a processor with a machine.
         image: where it will be.
         counted: symbol of a function whose instructions are to be counted; "": none.
     """
     place = image.parent
-    files = {"start.c": _START, "count.c": _counting(counted) if counted else ""}
-    for name, text in files.items():
-        (place / name).write_text(f"/* SPDX-License-Identifier: Apache-2.0 */{text}", encoding="utf-8")
-    (place / "machine.ld").write_text(_SCRIPT, encoding="utf-8")
-    sources = [str(place / name) for name, text in files.items() if text]
-    wrapped = [f"-Wl,--wrap={counted}"] if counted else []
-    return [*_SPECS, "-T", str(place / "machine.ld"), *wrapped, *sources]
+    write_machine(place)
+    if not counted:
+        return machine_flags(str(place))
+    count = place / "count.c"
+    count.write_text(f"/* SPDX-License-Identifier: Apache-2.0 */{_counting(counted)}", encoding="utf-8")
+    return [*machine_flags(str(place)), f"-Wl,--wrap={counted}", str(count)]
 
 
-def run_image(target: Target, image: Path, stream: bytes, *arguments: str) -> tuple[bytes, int | None]:
+def run_image(target: Target, image: Path, stream: bytes) -> tuple[bytes, int | None]:
     """What an image writes for what it is given, and the instructions of the longest call that it counted.
 
     Raises:
@@ -134,9 +156,7 @@ def run_image(target: Target, image: Path, stream: bytes, *arguments: str) -> tu
     place = image.parent
     (place / _IN).write_bytes(stream)
     (place / _OUT).unlink(missing_ok=True)
-    told = ",".join(["enable=on", "target=native", "arg=main", *(f"arg={a}" for a in arguments)])
-    command = [target.emulator, "-M", target.machine, "-nographic", "-monitor", "none", "-serial", "none"]
-    command += ["-icount", "shift=0", "-semihosting-config", told, "-kernel", image.name]
+    command = run_flags(target, image.name)
     try:
         done = subprocess.run(
             command, cwd=place, stdin=subprocess.DEVNULL, capture_output=True, check=False, timeout=_LONGEST_S

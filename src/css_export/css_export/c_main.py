@@ -27,9 +27,14 @@ def word(command: int) -> bytes:
     return struct.pack("<Q", command)
 
 
-def state_hash(state: bytes | bytearray) -> int:
-    """The hash of a state, whose last word is filled up with zeros."""
-    words = np.frombuffer(bytes(state) + bytes(-len(state) % 8), np.uint64)
+def state_hash(state: bytes | bytearray, kind: str = "<u8") -> int:
+    """The hash of a state, whose last word is filled up with zeros.
+
+    Args:
+        state: in the order of bytes of a processor.
+        kind: of its words, as numpy names it.
+    """
+    words = np.frombuffer(bytes(state) + bytes(-len(state) % 8), kind).astype(np.uint64)
     places = 2 * np.arange(len(words), dtype=np.uint64) + np.uint64(1)
     return int(np.sum(places * ((words ^ (words >> _SHIFT)) * _MIX), dtype=np.uint64))
 

@@ -9,6 +9,7 @@ import hashlib
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -239,6 +240,20 @@ def leaves(layout: Layout, name: str = "", at: int = 0) -> Iterator[tuple[str, S
     else:
         for field in layout.fields:
             yield from leaves(field.layout, f"{name}.{field.name}" if name else field.name, at + field.offset)
+
+
+def other_order(layout: Layout, data: bytes | bytearray) -> bytes:
+    """Structs one after the other, each number in the other order of bytes."""
+    return np.frombuffer(bytes(data), np.uint8).reshape(-1, max(layout.size, 1))[:, _turned(layout)].tobytes()
+
+
+@lru_cache
+def _turned(layout: Layout) -> np.ndarray:
+    """Where each byte of a struct in the other order of bytes comes from."""
+    place = np.arange(layout.size)
+    for _, scalar, at in leaves(layout):
+        place[at : at + scalar.size] = place[at : at + scalar.size][::-1]
+    return place
 
 
 def layout_number(structs: Mapping[str, Struct]) -> int:

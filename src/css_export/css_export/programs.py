@@ -50,7 +50,7 @@ def compiled_program(
         objects = []
         for source in sources:
             objects.append(compiled_object(target, source, program.with_name(f"{source.stem}.o")))
-        beside = image_command(target, program, counted)
+        beside = image_command(program, counted)
         _run(
             [target.compiler, "-O1", *target.flags, *beside, "-o", str(program), *map(str, objects + libraries), "-lm"]
         )
@@ -94,24 +94,24 @@ def _run(command: list[str]) -> None:
         raise ToolError(f"{command[0]}: {(reasons or said)[0]}")
 
 
-def run_program(target: Target, program: Path, stream: bytes, *arguments: str) -> bytes:
+def run_program(target: Target, program: Path, stream: bytes) -> bytes:
     """What a program writes for what it is given.
 
     Raises:
         ToolError: it failed.
     """
-    return counted_run(target, program, stream, *arguments)[0]
+    return counted_run(target, program, stream)[0]
 
 
-def counted_run(target: Target, program: Path, stream: bytes, *arguments: str) -> tuple[bytes, int | None]:
+def counted_run(target: Target, program: Path, stream: bytes) -> tuple[bytes, int | None]:
     """What a program writes, and instructions of the longest call that it counts; None where none are counted.
 
     Raises:
         ToolError: it failed.
     """
     if target.machine:
-        return run_image(target, program, stream, *arguments)
-    command = [*([target.emulator] if target.emulator else []), str(program), *arguments]
+        return run_image(target, program, stream)
+    command = [*([target.emulator] if target.emulator else []), str(program)]
     try:
         done = subprocess.run(command, input=stream, capture_output=True, check=False, timeout=_LONGEST_S)
     except (OSError, subprocess.TimeoutExpired) as error:

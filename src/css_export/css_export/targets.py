@@ -93,7 +93,16 @@ _TARGETS = (
         machine="mps2-an386",
         emulator_package="qemu-system-arm",
     ),
-    Target("leon3", "sparc-unknown-elf", "leon3", big_endian=True, runs=False),
+    Target(
+        "leon3",
+        "sparc-unknown-elf",
+        "leon3",
+        compiler="sparc64-linux-gnu-gcc",
+        flags=("-m32", "-mcpu=leon3"),
+        package="gcc-sparc64-linux-gnu gcc-multilib-sparc64-linux-gnu libc6-dev-sparc-sparc64-cross",
+        emulator="qemu-sparc32plus-static",
+        big_endian=True,
+    ),
 )
 TARGETS = {target.name: target for target in _TARGETS}
 HOST = "x86_64"

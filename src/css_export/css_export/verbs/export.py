@@ -105,7 +105,8 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
     _tell(f"{library.function.name}: the calls of the flight")
     with tempfile.TemporaryDirectory() as folder, BagReader(options.verify) as reader:
         through = reference_of(library, Path(folder)) if library.mathematics == MUSL else None
-        calls = listen(reader, mission, library, options.steps, through)
+        big = any(row.code.target.big_endian for row in rows)
+        calls = listen(reader, mission, library, options.steps, through, big_endian=big)
     lines = _shortcomings(library, calls, options)
     for row in rows:
         row.messages, row.as_recorded = calls.messages, calls.as_recorded
@@ -114,7 +115,7 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
             _tell(f"{library.function.name}: {calls.steps} steps on {row.code.target.name}")
             try:
                 written, row.instructions = run_library(library, row.code.target, place, calls)
-                row.verdict = judged(library, calls, written)
+                row.verdict = judged(library, calls, written, big_endian=row.code.target.big_endian)
                 shared = place / HOST / f"lib{library.prefix}.so"
                 if row.code.target.name == HOST and shared.is_file():
                     row.time_ratio = time_ratio(library, shared, calls)
