@@ -123,7 +123,8 @@ def asked(target, folder):
     source = folder / "functions.c"
     source.write_text(text.replace("static uint64_t drawn;", f"{names}static uint64_t drawn;"))
     program = compiled_program(target, [source], [folder / "shipped.o"], folder / "functions")
-    return run_program(target, program, b"")
+    written = run_program(target, program, b"")
+    return np.frombuffer(written, ">u8" if target.big_endian else "<u8").astype("<u8").tobytes()
 
 
 def drawn():
@@ -191,7 +192,7 @@ def control(tmp_path_factory):
         mission = mission_from_text(reader.mission_text or "", "reference")
         (function,) = flying_functions(mission, ["mrp_control"])
         library = made_library(mission, function, MUSL)
-        calls = listen(reader, mission, library, STEPS, reference_of(library, folder / "reference"))
+        calls = listen(reader, mission, library, STEPS, reference_of(library, folder / "reference"), big_endian=True)
     return library, folder, calls
 
 
@@ -203,7 +204,7 @@ def test_every_step_gives_the_same_bits_on_all_processors(target, control):
     code = library.for_target(target)
     write_library(library, [code], folder)
     written, instructions = run_library(library, target, folder, calls)
-    verdict = judged(library, calls, written)
+    verdict = judged(library, calls, written, big_endian=target.big_endian)
     assert (verdict.steps, verdict.equal, verdict.largest) == (STEPS, STEPS, {})
     assert code.contents.variables == 0
     assert "musl" in library.version
