@@ -60,6 +60,8 @@ def print_report(
             console.print(
                 f"{row.library.function.name} on {row.code.target.name}: not run: {row.why_not}", soft_wrap=True
             )
+        if row.verdict is not None and row.verdict.equal != row.verdict.steps:
+            console.print(_where(row, row.verdict), soft_wrap=True)
         if row.differing is not None:
             told = ", ".join(f"{name} ({100.0 * share:.2f} %)" for name, share in row.differing.items())
             why = f"its C library gives other bits than that of this machine: {told}" if told else "no function of the "
@@ -78,6 +80,15 @@ def print_report(
     for name, reason in missing.items():
         console.print(f"{name}: left out: {reason}", soft_wrap=True)
     console.print(f"written: {folder}", soft_wrap=True)
+
+
+def _where(row: Row, verdict: Verdict) -> str:
+    """Which output differs most, and in how many steps it is the state alone."""
+    told = f"{row.library.function.name} on {row.code.target.name}: "
+    if verdict.largest:
+        told += f"{max(verdict.largest, key=verdict.largest.__getitem__)} differs most; "
+    told += f"outputs are equal after {verdict.equal_outputs} of {verdict.steps} steps"
+    return f"{told}, outputs and state after {verdict.equal}"
 
 
 def _effort(row: Row) -> str:
@@ -113,13 +124,17 @@ def _texts(row: Row, verified: bool) -> list[str]:
 def result(row: Row) -> dict[str, Any]:
     """A row as JSON has it."""
     contents, verdict = row.code.contents, row.verdict
-    compared: dict[str, Any] = {"steps": None, "equal_steps": None, "largest_relative_difference": None}
+    compared: dict[str, Any] = dict.fromkeys(
+        ("steps", "equal_steps", "steps_of_equal_outputs", "largest_relative_difference", "largest_difference_of")
+    )
     if verdict is not None:
         largest = verdict.largest_relative_difference
         compared = {
             "steps": verdict.steps,
             "equal_steps": verdict.equal,
+            "steps_of_equal_outputs": verdict.equal_outputs,
             "largest_relative_difference": largest if largest != float("inf") else "infinite",
+            "largest_difference_of": max(verdict.largest, key=verdict.largest.__getitem__, default=None),
         }
     return {
         "component": row.library.function.name,

@@ -127,6 +127,24 @@ def test_numbers_in_the_other_order_of_bytes_are_the_same_numbers(exported):
     assert calls.hashes_of_big_endian == []
 
 
+@pytest.mark.parametrize(
+    "cplusplus", [pytest.param(False, marks=with_compiler), pytest.param(True, marks=with_cplusplus)]
+)
+def test_examples_in_the_documentation_compile_without_warnings(exported, cplusplus, tmp_path):
+    library, folder, _ = exported
+    page = (Path(__file__).parents[3] / "docs" / "export.md").read_text()
+    examples = [text.partition("```")[0] for text in page.split("```c\n")[1:]]
+    assert len(examples) == 2
+    if library.function.component != "ekf":
+        return
+    for k, text in enumerate(examples):
+        source = tmp_path / f"example{k}.c"
+        source.write_text(text)
+        header = folder / f"{library.prefix}.h"
+        (tmp_path / header.name).write_bytes(header.read_bytes())
+        compiled_object(HOST, source, tmp_path / "example.o", cplusplus=cplusplus)
+
+
 @with_compiler
 def test_the_time_of_a_step_is_measured(exported):
     library, folder, calls = exported
