@@ -247,6 +247,29 @@ def test_what_must_not_fly_is_refused_by_name(compiled, named):
         library.for_target(HOST)
 
 
+@kernel
+def _beyond(p: Limits, x: float) -> float:
+    total = 0.0
+    for i in range(int(x)):
+        total += (p.most, x, 1.0)[i]
+    return total
+
+
+def test_an_exception_that_lost_its_name_is_named_nevertheless():
+    library = made_library(load_mission("okeefe_2013"), function_of(_beyond))
+    with pytest.raises(ExportError, match="IndexError"):
+        library.for_target(HOST)
+
+
+@pytest.mark.parametrize("name", ["sunline_ukf", "sunline_suekf"])
+def test_an_unscented_filter_has_no_way_to_an_exception(name):
+    nodes = f"[css_sim/dynamics, css_sim/css_array, css_sim/gyro, css_estimation/{name}, sunpoint_control/mrp_control]"
+    changes = [f"graph.nodes={nodes}", f"graph.estimator={name}", f"{name}.health.enabled=false"]
+    mission = load_mission("okeefe_2013", changes)
+    (function,) = flying_functions(mission, [name])
+    assert made_library(mission, function).for_target(HOST).contents.code > 1000
+
+
 def test_allocation_is_refused_by_name():
     text = "declare ptr @malloc(i64)\ndefine ptr @f(i64 %n) {\n  %p = call ptr @malloc(i64 %n)\n  ret ptr %p\n}\n"
     with pytest.raises(ExportError, match="malloc"):
