@@ -5,6 +5,7 @@ Prints a table of what `./sunpoint export --verify` found. Ends with a JSON obje
 an export failed, or a step differs by more than the last bits of named functions.
 
     python benchmarks/exported_missions.py --missions okeefe_2013 --duration 600
+    python benchmarks/exported_missions.py --mathematics musl --steps 3000 --targets x86_64 aarch64 cortex-m7
 """
 
 import argparse
@@ -29,6 +30,8 @@ def main() -> int:
     every = sorted(file.stem for file in (ROOT / "config").glob("*.yaml"))
     parser.add_argument("--missions", nargs="+", default=every, metavar="NAME", help="default: all in config/")
     parser.add_argument("--duration", type=float, metavar="S", help="of a flight [s]; default: the mission's")
+    parser.add_argument("--steps", type=int, metavar="N", help="compared of each component; default: all that flew")
+    parser.add_argument("--mathematics", choices=("target", "musl"), default="target", help="as of `export`")
     parser.add_argument("--targets", nargs="+", default=list(_TARGETS), metavar="NAME")
     options = parser.parse_args()
     results: list[dict[str, Any]] = []
@@ -50,7 +53,9 @@ def _compared(mission: str, options: argparse.Namespace, folder: Path) -> tuple[
     # a flight may miss a criterion of its mission and be a flight nevertheless
     if _run("fly", mission, *length, "--out", str(bag)).returncode not in (0, 1):
         return [], 1
-    done = _run("export", mission, "--target", *options.targets, "--verify", str(bag), "-o", str(folder), "--json")
+    most = [] if options.steps is None else ["--steps", f"{options.steps}"]
+    asked = ["--target", *options.targets, "--mathematics", options.mathematics, "--verify", str(bag), *most]
+    done = _run("export", mission, *asked, "-o", str(folder), "--json")
     lines = done.stdout.splitlines()
     if not lines or not lines[-1].startswith("{"):
         return [], 1
@@ -67,10 +72,12 @@ def _print(results: list[dict[str, Any]]) -> None:
         table.add_name(heading)
     for heading in ("code\n[bytes]", "stack\n[bytes]", "steps", "equal", "largest\ndifference"):
         table.add_number(heading)
+    table.add_name("differing functions")
     for r in results:
         compared = [f"{r[key]}" for key in ("steps", "equal_steps", "largest_relative_difference")]
         sizes = [f"{r[key]}" for key in ("code_bytes", "stack_bytes")]
-        table.add_texts([r["mission"], r["component"], r["target"], *sizes, *compared])
+        named = ", ".join(r["differing_functions"] or {}) or r["not_run"] or ""
+        table.add_texts([r["mission"], r["component"], r["target"], *sizes, *compared, named])
     Console(highlight=False).print(table)
 
 

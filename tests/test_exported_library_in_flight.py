@@ -2,6 +2,7 @@
 """A flight with an exported library in the place of a node's compiled function is the flight without it."""
 
 import shutil
+from typing import Any
 
 import pytest
 from flights import messages_by_topic, short_mission
@@ -10,7 +11,9 @@ from css_bringup.commands import fly as fly_command
 from css_bringup.composed import ComposedFlight
 from css_bringup.stand_ins import stand_ins
 from css_common.command import USAGE
+from css_common.component_error import ComponentError
 from css_common.mission_file import MissionError
+from css_common.stepping import Stepper
 from css_export.flown import flying_functions
 from css_export.library import made_library, write_library
 from css_export.programs import compiled_program, shared_library
@@ -34,18 +37,34 @@ def files(mission, tmp_path_factory):
     library = made_library(mission, function)
     write_library(library, [library.for_target(HOST)], folder)
     packed = folder / HOST.name / "libsunpoint_ekf.a"
-    own = folder / "own.c"
-    own.write_text(
-        '#include "sunpoint_ekf.h"\n'
-        "void sunpoint_ekf_step(const sunpoint_ekf_params *params, sunpoint_ekf_state *state,\n"
-        "    const sunpoint_ekf_in *in, sunpoint_ekf_out *out)\n{\n    (void)params;\n    (void)state;\n    (void)in;\n"
-        "    out->sun_b[2] = 1.0;\n    out->covariance[0] = -1.0;\n    out->validity = 2;\n}\n"
-    )
+
+    def own(name, body, layout="SUNPOINT_EKF_LAYOUT"):
+        """A library of somebody's own, its step all but the end of it."""
+        source = folder / f"{name}.c"
+        source.write_text(
+            '#include "sunpoint_ekf.h"\n#include <stdio.h>\n#include <stdlib.h>\n'
+            + (f"const uint64_t sunpoint_ekf_layout = {layout};\n" if layout else "")
+            + "void sunpoint_ekf_step(const sunpoint_ekf_params *params, sunpoint_ekf_state *state,\n"
+            "    const sunpoint_ekf_in *in, sunpoint_ekf_out *out)\n{\n    static int steps;\n    (void)params;\n"
+            "    (void)state;\n    (void)in;\n    steps++;\n"
+            f"    out->sun_b[2] = 1.0;\n    out->covariance[0] = -1.0;\n    out->validity = 2;\n    {body}\n}}\n"
+        )
+        return shared_library(HOST, source, folder / f"{name}.so")
+
     return {
         "library": shared_library(HOST, packed, folder / "libsunpoint_ekf.so"),
         "program": compiled_program(HOST, [folder / "sunpoint_ekf_main.c"], [packed], folder / "sunpoint_ekf_main"),
-        "own": shared_library(HOST, own, folder / "own.so"),
+        "own": own("own", 'printf("step %d\\n", steps);'),
+        "unnamed": own("unnamed", "", layout=""),
+        "other": own("other", "", layout="1"),
+        "crashing": own("crashing", "if (steps == 30) { abort(); }"),
     }
+
+
+def functions_of_ekf(mission):
+    """The function of the estimator."""
+    (function,) = flying_functions(mission, ["ekf"])
+    return function
 
 
 def flown(mission, bag, asked=()):
@@ -73,6 +92,39 @@ def test_it_is_the_library_that_flies(mission, files, without, tmp_path):
     own = flown(mission, tmp_path / "bag", [f"ekf={files['own']}"])
     assert own["/ekf/sun_estimate"] != without["/ekf/sun_estimate"]
     assert own["/wheels/torque_command"] != without["/wheels/torque_command"]
+
+
+def test_a_library_that_does_not_say_its_structs_is_named(mission, files, tmp_path, capfd):
+    flown(mission, tmp_path / "bag", [f"ekf={files['unnamed']}"])
+    assert "unnamed.so: has no sunpoint_ekf_layout" in capfd.readouterr().err
+
+
+def test_a_library_of_other_structs_does_not_fly(mission, files):
+    with pytest.raises(MissionError, match=r"other\.so: made for other structs"):
+        stand_ins(mission, [f"ekf={files['other']}"])
+
+
+def test_a_library_of_another_processor_does_not_fly(mission, files, tmp_path):
+    foreign = tmp_path / "foreign.so"
+    data = bytearray(files["library"].read_bytes())
+    data[18:20] = (183).to_bytes(2, "little")  # AArch64 (System V ABI)
+    foreign.write_bytes(data)
+    with pytest.raises(MissionError, match="a shared library of aarch64, this machine is x86_64"):
+        stand_ins(mission, [f"ekf={foreign}"])
+
+
+def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
+    """Its process ends, not that of the graph, and why is said in a line, again and again."""
+    (node,) = (node for node in mission.nodes if node.name == "ekf")
+    stand_in = stand_ins(mission, [f"ekf={files['crashing']}"])["ekf"]
+    stepper = Stepper(stand_in, node.name, node.canonical, mission.events, mission.epoch_ns)
+    step: Any = vars(stepper.component)["_step"]
+    arguments = functions_of_ekf(mission).sample
+    for _ in range(29):
+        step(*arguments)
+    for _ in range(2):
+        with pytest.raises(ComponentError, match=r"crashing\.so: ended by SIGABRT$"):
+            step(*arguments)
 
 
 @pytest.mark.parametrize(

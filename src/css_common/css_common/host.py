@@ -28,6 +28,7 @@ from rclpy.timer import Timer
 from css_common import process_faults, ros_parameters
 from css_common.codec import Sample, codec_of
 from css_common.component import Component, Outgoing, Output, Plant, Standing
+from css_common.component_error import ComponentError
 from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import REJECTED, STRANGER, Edge
 from css_common.fault_services import FaultServices
@@ -406,8 +407,8 @@ class ComponentNode(LifecycleNode):
 
     def _report_failure(self, error: Exception) -> None:
         self.counters["cycle_failed"] += 1
-        trace = "".join(traceback.format_exception(error))
-        self._report_once(f"cycle failed, no output for this stamp:\n{trace}")
+        trace = f" {error}" if isinstance(error, ComponentError) else f"\n{''.join(traceback.format_exception(error))}"
+        self._report_once(f"cycle failed, no output for this stamp:{trace}")
 
     def _report_once(self, text: str) -> None:
         if text not in self._seen_errors:

@@ -3,6 +3,7 @@
 
 from pathlib import Path
 
+from css_export.bare_metal import machine_flags, run_flags, write_machine
 from css_export.flown import INPUT, OUTPUT, PARAMETERS, STATE
 from css_export.library import Library, MachineCode
 from css_export.targets import Target
@@ -19,6 +20,9 @@ def write_build_files(library: Library, codes: list[MachineCode], folder: Path) 
         "CMakeLists.txt": cmake(library, codes),
         "README.md": page(library, codes),
     }
+    for code in codes:
+        if code.target.machine:
+            write_machine(folder / code.target.name)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
 
@@ -26,23 +30,28 @@ def write_build_files(library: Library, codes: list[MachineCode], folder: Path) 
 def makefile(library: Library, codes: list[MachineCode]) -> str:
     """A Makefile that links the C main for a target."""
     prefix = library.prefix
-    compilers = "".join(
-        f"CC_{code.target.name} = {' '.join((code.target.compiler, *code.target.flags))}\n"
-        for code in codes
-        if code.target.compiler
-    )
+    compilers = "".join(_compiler(code.target) for code in codes)
     return f"""# SPDX-License-Identifier: Apache-2.0
 # make TARGET={codes[0].target.name} [CFLAGS=...]: the C main, linked with the library of a target.
 TARGET ?= {codes[0].target.name}
 CFLAGS ?= -std=c99 -O1 -Wall -Wextra -Wpedantic
 {compilers}
 $(TARGET)/{prefix}_main: {prefix}_main.c {prefix}.h $(TARGET)/lib{prefix}.a
-\t$(CC_$(TARGET)) $(CFLAGS) -o $@ {prefix}_main.c $(TARGET)/lib{prefix}.a -lm
+\t$(CC_$(TARGET)) $(CFLAGS) -o $@ {prefix}_main.c $(TARGET)/lib{prefix}.a $(WITH_$(TARGET)) -lm
 
 .PHONY: clean
 clean:
 \trm -f */{prefix}_main
 """
+
+
+def _compiler(target: Target) -> str:
+    """Which compiler a Makefile takes for a target, and what it needs beside the C main."""
+    if not target.compiler:
+        return f"CC_{target.name} ?= $(error no compiler is known for {target.name}: give CC_{target.name}=...)\n"
+    flags = (*target.flags, *(("-static",) if target.emulator and not target.machine else ()))
+    text = f"CC_{target.name} ?= {' '.join((target.compiler, *flags))}\n"
+    return text + (f"WITH_{target.name} = {' '.join(machine_flags(target.name))}\n" if target.machine else "")
 
 
 def cmake(library: Library, codes: list[MachineCode]) -> str:
@@ -126,19 +135,25 @@ linked comes to it. Loops are bounded by the numbers of cells and wheels and of 
 ## `{prefix}_main.c`
 
 Reads records from standard input, each a word of 64 bits and what belongs to it: 1, then `{prefix}_in`: one step;
-2: the state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks. For each step it writes
+2: the state is set up anew; 3, then `{prefix}_params`: parameters from now on, which it checks; 4, then the state: from
+there on; 5: it writes `{prefix}_layout`, the number of the structs of the header. For each step it writes
 `{prefix}_out` and a hash of the state (`hash_of_state`), with any argument the state itself.
 `make TARGET={codes[0].target.name}` builds it.
-{_bare(codes)}"""
+{_bare(prefix, codes)}"""
 
 
-def _bare(codes: list[MachineCode]) -> str:
-    bare: list[Target] = [code.target for code in codes if not code.target.runs]
-    if not bare:
-        return ""
-    names = ", ".join(target.name for target in bare)
-    return f"""
-## Not run
+def _bare(prefix: str, codes: list[MachineCode]) -> str:
+    """What is said of targets without an operating system, and of those that are not run."""
+    text = ""
+    for target in (code.target for code in codes):
+        if target.machine:
+            command = " ".join(run_flags(target, f"{target.name}/{prefix}_main"))
+            text += f"""
+For {target.name}, `start.c` and `machine.ld` in its folder make an image, which reads `in.bin` and writes `out.bin`:
 
-{names}: objects were made, and no instruction of them was run.
+    {command}
 """
+    names = ", ".join(code.target.name for code in codes if not code.target.runs)
+    return text + (
+        f"\n## Not run\n\n{names}: objects were made, and no instruction of them was run.\n" if names else ""
+    )

@@ -48,6 +48,19 @@ class Interface:
 
 
 @dataclass(frozen=True)
+class Native:
+    """A function as numba has compiled it for this machine, as the nodes call it.
+
+    Attributes:
+        address: of the entry, which has the calling convention of numba and takes four pointers.
+        dispatcher: with which the code goes.
+    """
+
+    address: int
+    dispatcher: Any
+
+
+@dataclass(frozen=True)
 class Compiled:
     """A function as intermediate code.
 
@@ -59,6 +72,7 @@ class Compiled:
     interface: Interface
     text: str
     symbol: str
+    native: Native
 
 
 def compile_function(function: Function) -> Compiled:
@@ -81,7 +95,9 @@ def compile_function(function: Function) -> Compiled:
     overload = dispatcher.overloads[signature.args]
     structs[OUTPUT] = given["struct"]
     interface = Interface(structs, tuple(fields), given["type"])
-    return Compiled(interface, texts[overload.library.name], overload.fndesc.llvm_func_name)
+    symbol = overload.fndesc.llvm_func_name
+    native = Native(overload.library.get_pointer_to_function(symbol), dispatcher)
+    return Compiled(interface, texts[overload.library.name], symbol, native)
 
 
 def interface_of(function: Function, output: Any) -> Interface:

@@ -14,11 +14,14 @@ from css_common.component import Component, Plant
 from css_common.mission import Mission, Node
 from css_common.schema import Values, unknown_name
 from css_environment.earth_light import new_light
+from css_estimation.attitude import sun_field_attitude
 from css_estimation.attitude.flight_references import References
 from css_estimation.health import watched
 from css_estimation.nodes.attitude_filter import AttitudeFilter
+from css_estimation.nodes.coning import Coning
 from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.nodes.slit_sun_angle import SlitPassages
+from css_estimation.nodes.triad import Triad
 from css_estimation.spin import slit_measurement, slit_passage
 from css_estimation.sun.heading_dispatch import estimate_heading, home_of
 from css_estimation.sun.sun_estimator import SunEstimator, hears_wheels
@@ -90,15 +93,15 @@ def flying_functions(mission: Mission, names: Iterable[str] = ()) -> list[Functi
     return functions
 
 
-def left_out(mission: Mission) -> list[str]:
-    """Components of a mission that belong to what flies and have no function to export."""
-    return [
-        node.name
+def left_out(mission: Mission) -> dict[str, str]:
+    """Components of a mission that belong to what flies and have no function to export, and why not."""
+    return {
+        node.name: _WHY_NOT.get(node.component, "it has no compiled function that flies")
         for node in mission.nodes
         if node.package in ("css_estimation", "sunpoint_control")
         and not issubclass(node.component, Plant)
         and not any(True for _ in functions_of(node))
-    ]
+    }
 
 
 def functions_of(node: Node) -> Iterator[Function]:
@@ -246,6 +249,23 @@ def _slits(node: Node) -> Iterator[Function]:
     )
 
 
+def _triad(node: Node) -> Iterator[Function]:
+    kernel = sun_field_attitude.measured_attitude
+    direction, covariance = _ZERO, (0.0,) * 6
+    yield Function(
+        node.name,
+        node.name,
+        kernel,
+        (PARAMETERS, *[INPUT] * 6),
+        tuple(inspect.signature(kernel.py_func).parameters),
+        (sun_field_attitude.parameters(node.values), direction, covariance, direction, 0.0, direction, direction),
+        False,
+        "_attitude",
+        _about(kernel.py_func),
+        documented(kernel.py_func),
+    )
+
+
 def _stepped(
     node: Node, kernel: Any, roles: tuple[str, ...], sample: tuple[Any, ...], docs: dict[str, str] | None = None
 ) -> Function:
@@ -284,4 +304,8 @@ _KINDS: tuple[tuple[type[Component], Callable[[Node], Iterator[Function]]], ...]
     (AttitudeFilter, _attitude_filter),
     (Controller, _controller),
     (SlitPassages, _slits),
+    (Triad, _triad),
 )
+_WHY_NOT: dict[type[Component], str] = {
+    Coning: "it fits whole legs of a flight by numpy and scipy, on the ground as in flight: no step of it is compiled",
+}

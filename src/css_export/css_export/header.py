@@ -3,7 +3,7 @@
 
 from css_export.entry import Interface
 from css_export.flown import INPUT, OUTPUT, PARAMETERS, STATE, Function
-from css_export.layout import Array, Field, Layout, Scalar, Struct
+from css_export.layout import Array, Field, Layout, Scalar, Struct, layout_number
 from css_export.names import comment, identifier, quoted, snake
 
 STRUCTS = {PARAMETERS: "params", STATE: "state", INPUT: "in", OUTPUT: "out"}
@@ -41,6 +41,8 @@ extern "C" {{
 #endif
 
 #define {prefix.upper()}_VERSION {quoted(version)}
+/* Another number: other structs. A library of your own has `const uint64_t {prefix}_layout` of this value. */
+#define {prefix.upper()}_LAYOUT UINT64_C(0x{layout_number(interface.structs):016x})
 
 {structs}
 /* Within what a number of the parameters, or several that follow one another, must lie. */
@@ -65,6 +67,7 @@ int32_t {prefix}_check(const {prefix}_params *params);
 
 extern const {prefix}_params {prefix}_mission;
 extern const {prefix}_limit {prefix}_limits[{max(limits, 1)}];
+extern const uint64_t {prefix}_layout;
 extern const char {prefix}_version[{len(version.encode("ascii", "replace")) + 1}];
 
 #ifdef __cplusplus

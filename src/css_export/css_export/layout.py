@@ -5,9 +5,11 @@ Numbers are `double`, `float` and integers of a stated width, flags are bytes of
 same struct has the same bytes under every ABI for which Sunpoint exports; generated code checks its size.
 """
 
+import hashlib
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -238,3 +240,27 @@ def leaves(layout: Layout, name: str = "", at: int = 0) -> Iterator[tuple[str, S
     else:
         for field in layout.fields:
             yield from leaves(field.layout, f"{name}.{field.name}" if name else field.name, at + field.offset)
+
+
+def other_order(layout: Layout, data: bytes | bytearray) -> bytes:
+    """Structs one after the other, each number in the other order of bytes."""
+    return np.frombuffer(bytes(data), np.uint8).reshape(-1, max(layout.size, 1))[:, _turned(layout)].tobytes()
+
+
+@lru_cache
+def _turned(layout: Layout) -> np.ndarray:
+    """Where each byte of a struct in the other order of bytes comes from."""
+    place = np.arange(layout.size)
+    for _, scalar, at in leaves(layout):
+        place[at : at + scalar.size] = place[at : at + scalar.size][::-1]
+    return place
+
+
+def layout_number(structs: Mapping[str, Struct]) -> int:
+    """A number of 63 bits for what structs are: names, kinds and offsets of their members; never 0."""
+    digest = hashlib.sha256()
+    for role, layout in sorted(structs.items()):
+        digest.update(f"{role} {layout.size}\n".encode())
+        for name, scalar, at in leaves(layout):
+            digest.update(f"{name} {scalar.code} {at}\n".encode())
+    return int.from_bytes(digest.digest()[:8], "big") >> 1 | 1

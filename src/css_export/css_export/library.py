@@ -15,16 +15,19 @@ from css_export.archive import archive
 from css_export.c_main import main_text
 from css_export.data_text import constant_text, init_text, limits_text, step_text, version_text
 from css_export.elf import Contents, contents
-from css_export.entry import Compiled, Interface, compile_function
+from css_export.entry import Compiled, Interface, Native, compile_function
 from css_export.flown import MEMORY, PARAMETERS, STATE, Function
 from css_export.header import header_text
-from css_export.layout import pack
+from css_export.layout import layout_number, pack
 from css_export.limits import Limit, limits_of
-from css_export.machine_code import built
+from css_export.machine_code import Built, built
 from css_export.names import prefix_of
+from css_export.shipped_mathematics import EXACT, NAME, notice, with_mathematics
 from css_export.targets import Target
 
 _RELEASED = "css_estimation"  # whose version is that of Sunpoint
+TARGET, MUSL = "target", "musl"
+WHOSE = {TARGET: "of the C library that it is linked with", MUSL: f"of {NAME}"}
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ class Library:
         version: of Sunpoint, of the compilers, and the hash of the mission.
         limits: of its parameters.
         texts: its modules of intermediate code.
+        native: the kernel behind the same interface, as numba compiles it for this machine.
+        mathematics: TARGET or MUSL: whose functions it calls.
     """
 
     function: Function
@@ -59,11 +64,13 @@ class Library:
     interface: Interface
     limits: list[Limit]
     texts: tuple[str, ...]
+    native: Native
+    mathematics: str = TARGET
 
     @property
     def exported(self) -> tuple[str, ...]:
         """Symbols that others may link."""
-        names = ("step", "init", "check", "mission", "limits", "version")
+        names = ("step", "init", "check", "mission", "limits", "version", "layout")
         return tuple(f"{self.prefix}_{name}" for name in names)
 
     def for_target(self, target: Target) -> MachineCode:
@@ -72,10 +79,22 @@ class Library:
         Raises:
             ExportError: something in it must not fly, or there is no code for such a target.
         """
-        made = built(self.function.name, self.texts, self.exported, target)
+        made = self._built(target)
         stack = made.stacks[f"{self.prefix}_step"]
         packed = archive({"step.o": made.object})
         return MachineCode(target, made.object, packed, contents(made.object), stack)
+
+    def _built(self, target: Target) -> Built:
+        if self.mathematics == TARGET:
+            return built(self.function.name, self.texts, self.exported, target)
+        also: set[str] = set()
+        while True:
+            texts = with_mathematics(self.texts, also)
+            made = built(self.function.name, texts, self.exported, target)
+            more = set(contents(made.object).missing) & EXACT - also
+            if not more:
+                return made
+            also |= more
 
     def header(self) -> str:
         """`sunpoint_NAME.h`."""
@@ -83,7 +102,7 @@ class Library:
 
     def main(self) -> str:
         """`sunpoint_NAME_main.c`."""
-        return main_text(self.prefix)
+        return main_text(self.prefix, self.interface.structs[STATE].size)
 
 
 def state_values(function: Function, arguments: tuple[Any, ...]) -> tuple[Any, ...]:
@@ -91,15 +110,20 @@ def state_values(function: Function, arguments: tuple[Any, ...]) -> tuple[Any, .
     return tuple(value for value, role in zip(arguments, function.roles, strict=True) if role in (STATE, MEMORY))
 
 
-def made_library(mission: Mission, function: Function) -> Library:
+def made_library(mission: Mission, function: Function, mathematics: str = TARGET) -> Library:
     """Compiles a kernel of a mission.
+
+    Args:
+        mission: that it flies in.
+        function: the kernel.
+        mathematics: TARGET: sine and others are the C library's that the image is linked with; MUSL: they are in it.
 
     Raises:
         ExportError: it cannot be exported.
     """
     compiled: Compiled = compile_function(function)
     interface, prefix = compiled.interface, prefix_of(function.name)
-    version = version_of(mission, function)
+    version = version_of(mission, function, mathematics)
     structs = interface.structs
     p = function.sample[function.places(PARAMETERS)[0]]
     limits = limits_of(structs[PARAMETERS], p)
@@ -110,16 +134,17 @@ def made_library(mission: Mission, function: Function) -> Library:
         constant_text(f"{prefix}_mission", structs[PARAMETERS], pack(structs[PARAMETERS], p)),
         limits_text(prefix, limits),
         version_text(prefix, version),
+        f"@{prefix}_layout = constant i64 {layout_number(structs)}\n",
     )
-    return Library(function, prefix, version, interface, limits, texts)
+    return Library(function, prefix, version, interface, limits, texts, compiled.native, mathematics)
 
 
-def version_of(mission: Mission, function: Function) -> str:
+def version_of(mission: Mission, function: Function, mathematics: str) -> str:
     """What a library says of itself: what it was made of and by."""
     digest = hashlib.sha256(mission.text().encode()).hexdigest()
     return (
         f"Sunpoint {_release()}, {function.component} of mission {mission.name}, sha256 of the mission {digest}, "
-        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}"
+        f"numba {numba.__version__}, llvmlite {llvmlite.__version__}, mathematics {WHOSE[mathematics]}"
     )
 
 
@@ -141,6 +166,8 @@ def write_library(library: Library, codes: list[MachineCode], folder: Path) -> l
         folder / f"{library.prefix}.h": library.header().encode(),
         folder / f"{library.prefix}_main.c": library.main().encode(),
     }
+    if library.mathematics == MUSL:
+        files[folder / "COPYRIGHT.musl"] = notice().encode()
     for code in codes:
         place = folder / code.target.name
         place.mkdir(exist_ok=True)

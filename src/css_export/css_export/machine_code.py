@@ -66,7 +66,9 @@ def built(name: str, texts: Iterable[str], exported: Iterable[str], target: Targ
     done = subprocess.run([sys.executable, "-m", __name__], input=asked.encode(), capture_output=True, check=False)
     said = done.stderr.decode(errors="replace")
     if done.returncode != 0:
-        reason = said.strip().splitlines()[-1] if said.strip() else f"LLVM ended with {done.returncode}"
+        lines = [line for line in said.splitlines() if line.strip(" ^~")]
+        reason = next((line for line in lines if "error:" in line), lines[-1] if lines else "")
+        reason = reason or f"LLVM ended with {done.returncode}"
         raise ExportError(f"{name} for {target.name}: {reason}")
     answer = json.loads(done.stdout)
     if "refused" in answer:
@@ -92,7 +94,7 @@ def _emitted(asked: dict[str, Any]) -> dict[str, Any]:
     _hide(module, set(asked["exported"]))
     _optimise(module, machine)
     text = str(module)
-    refuse(asked["name"], text)
+    refuse(asked["name"], text, asked["texts"])
     told = llvm.parse_assembly(_with_short_names(_DEFINITION.sub(r'\1 "warn-stack-size"="0" {', text), "sunpoint.2"))
     told.verify()
     calls = {
@@ -103,8 +105,13 @@ def _emitted(asked: dict[str, Any]) -> dict[str, Any]:
     return {"object": machine.emit_object(told).hex(), "calls": calls}
 
 
-def refuse(name: str, text: str) -> None:
+def refuse(name: str, text: str, before: Iterable[str] = ()) -> None:
     """Refuses intermediate code that holds what must not fly.
+
+    Args:
+        name: for errors.
+        text: the code.
+        before: the same before it was optimised, which still names the exceptions.
 
     Raises:
         ExportError: naming it.
@@ -117,7 +124,8 @@ def refuse(name: str, text: str) -> None:
     if bad:
         raise ExportError(f"{name}: allocates memory ({', '.join(bad)}); a kernel that flies has room given to it")
     if NEVER in declared or _EXCEPTION in text:
-        told = ", ".join(sorted(set(_exceptions(text)))) or "an exception"
+        found = set(_exceptions(text)) or {kind for module in before for kind in _exceptions(module)}
+        told = " or ".join(sorted(found)) or "an exception"
         raise ExportError(f"{name}: can raise {told}, for which nobody waits in flight")
 
 

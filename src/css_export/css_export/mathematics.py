@@ -37,7 +37,8 @@ def differing_functions(linked: list[str], target: Target, folder: Path) -> dict
     for one in (TARGETS[HOST], target):
         program = compiled_program(one, [source], [], folder / f"mathematics_{one.name}")
         given.append(run_program(one, program, b""))
-    here, there = (struct.unpack(f"<{len(asked) * ARGUMENTS}Q", data) for data in given)
+    orders = ("<", ">" if target.big_endian else "<")
+    here, there = (struct.unpack(f"{o}{len(asked) * ARGUMENTS}Q", d) for o, d in zip(orders, given, strict=True))
     shares = {}
     for k, name in enumerate(asked):
         rows = slice(k * ARGUMENTS, (k + 1) * ARGUMENTS)

@@ -5,11 +5,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
+from css_export.bare_metal import image_command, run_image
 from css_export.errors import ToolError
 from css_export.targets import Target
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
-_EMULATOR_PACKAGE = "qemu-user-static"
 _LONGEST_S = 3600
 
 
@@ -19,7 +19,7 @@ def why_not(target: Target) -> str | None:
         return "no emulator of a whole program is known for it: objects alone"
     missing = [
         package
-        for tool, package in ((target.compiler, target.package), (target.emulator, _EMULATOR_PACKAGE))
+        for tool, package in ((target.compiler, target.package), (target.emulator, target.emulator_package))
         if tool and shutil.which(tool) is None
     ]
     return f"not installed: apt-get install {' '.join(missing)}" if missing else None
@@ -30,13 +30,31 @@ def can_link(target: Target) -> bool:
     return bool(target.compiler) and shutil.which(target.compiler) is not None
 
 
-def compiled_program(target: Target, sources: list[Path], libraries: list[Path], program: Path) -> Path:
+def compiled_program(
+    target: Target, sources: list[Path], libraries: list[Path], program: Path, counted: str = ""
+) -> Path:
     """Compiles and links a program, warnings as errors; another processor's with its C library inside.
+
+    Args:
+        target: the processor.
+        sources: in C.
+        libraries: archives.
+        program: where it goes.
+        counted: symbol of a function whose instructions are to be counted, where the emulator can do that.
 
     Raises:
         ToolError: the compiler is missing or refuses it.
     """
     static = ["-static"] if target.emulator else []
+    if target.machine:
+        objects = []
+        for source in sources:
+            objects.append(compiled_object(target, source, program.with_name(f"{source.stem}.o")))
+        beside = image_command(program, counted)
+        _run(
+            [target.compiler, "-O1", *target.flags, *beside, "-o", str(program), *map(str, objects + libraries), "-lm"]
+        )
+        return program
     files = [*map(str, sources), *map(str, libraries)]
     command = [target.compiler, *WARNINGS, "-O1", *target.flags, *static, "-o", str(program), *files, "-lm"]
     _run(command)
@@ -71,17 +89,29 @@ def _run(command: list[str]) -> None:
     except OSError as error:
         raise ToolError(f"{command[0]}: {error.strerror}") from error
     if done.returncode != 0:
-        said = done.stderr.decode(errors="replace").strip().splitlines()
-        raise ToolError(f"{command[0]}: {next((line for line in said if 'error' in line), said[-1] if said else '')}")
+        said = done.stderr.decode(errors="replace").strip().splitlines() or [f"ended with {done.returncode}"]
+        reasons = [line for line in said if "error" in line or "undefined" in line]
+        raise ToolError(f"{command[0]}: {(reasons or said)[0]}")
 
 
-def run_program(target: Target, program: Path, stream: bytes, *arguments: str) -> bytes:
+def run_program(target: Target, program: Path, stream: bytes) -> bytes:
     """What a program writes for what it is given.
 
     Raises:
         ToolError: it failed.
     """
-    command = [*([target.emulator] if target.emulator else []), str(program), *arguments]
+    return counted_run(target, program, stream)[0]
+
+
+def counted_run(target: Target, program: Path, stream: bytes) -> tuple[bytes, int | None]:
+    """What a program writes, and instructions of the longest call that it counts; None where none are counted.
+
+    Raises:
+        ToolError: it failed.
+    """
+    if target.machine:
+        return run_image(target, program, stream)
+    command = [*([target.emulator] if target.emulator else []), str(program)]
     try:
         done = subprocess.run(command, input=stream, capture_output=True, check=False, timeout=_LONGEST_S)
     except (OSError, subprocess.TimeoutExpired) as error:
@@ -89,4 +119,4 @@ def run_program(target: Target, program: Path, stream: bytes, *arguments: str) -
     if done.returncode != 0:
         said = done.stderr.decode(errors="replace").strip()
         raise ToolError(f"{' '.join(command)}: ended with {done.returncode}: {said}")
-    return done.stdout
+    return done.stdout, None

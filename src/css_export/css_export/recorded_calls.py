@@ -20,7 +20,7 @@ from css_export.errors import ExportError
 from css_export.flown import INPUT, OUTPUT, Function
 from css_export.flown import PARAMETERS as PARAMETERS_ROLE
 from css_export.flown import STATE as STATE_ROLE
-from css_export.layout import Struct, pack
+from css_export.layout import Struct, other_order, pack
 from css_export.library import Library, state_values
 from css_recording.bag_metadata import absolute
 from css_recording.bag_reader import BagReader
@@ -32,15 +32,19 @@ class Calls:
 
     Attributes:
         stream: as `c_main` describes it.
+        inputs: struct of inputs of each step.
         outputs: struct of outputs after each step.
         hashes: of the state after it.
+        hashes_of_big_endian: as a processor has it whose numbers begin with the most significant byte; where asked for.
         messages: that the component gave, and of them those that are the bytes that were recorded.
         begun: steps before which the state was set up anew.
     """
 
     stream: bytearray = field(default_factory=bytearray)
+    inputs: list[bytes] = field(default_factory=list)
     outputs: list[bytes] = field(default_factory=list)
     hashes: list[int] = field(default_factory=list)
+    hashes_of_big_endian: list[int] = field(default_factory=list)
     messages: int = 0
     as_recorded: int = 0
     begun: list[int] = field(default_factory=list)
@@ -54,8 +58,9 @@ class Calls:
 class Listener:
     """Stands between a component and a kernel, and keeps what passes."""
 
-    def __init__(self, library: Library, most: int | None = None) -> None:
+    def __init__(self, library: Library, most: int | None = None, *, big_endian: bool = False) -> None:
         """Listens to the kernel of a library, for at most so many steps."""
+        self._big_endian = big_endian
         self.calls = Calls()
         self._library = library
         self._structs = library.interface.structs
@@ -103,7 +108,8 @@ class Listener:
         if parameters != self._parameters:
             calls.stream += word(PARAMETERS) + parameters
             self._parameters = parameters
-        calls.stream += word(STEP) + self._packed(INPUT, arguments)
+        calls.inputs.append(bytes(self._packed(INPUT, arguments)))
+        calls.stream += word(STEP) + calls.inputs[-1]
 
     def _note_after(self, arguments: tuple[Any, ...], result: Any) -> None:
         function, calls = self._library.function, self.calls
@@ -113,6 +119,9 @@ class Listener:
             after[function.places(STATE_ROLE)[0]], output = result  # type: ignore[index]
         self._state = bytes(pack(self._structs[STATE_ROLE], state_values(function, tuple(after))))
         calls.hashes.append(state_hash(self._state))
+        if self._big_endian:
+            turned = other_order(self._structs[STATE_ROLE], self._state)
+            calls.hashes_of_big_endian.append(state_hash(turned, ">u8"))
         calls.outputs.append(bytes(packed_output(function, self._structs[OUTPUT], arguments, output)))
 
 
@@ -123,15 +132,33 @@ def packed_output(function: Function, struct: Struct, arguments: tuple[Any, ...]
     return pack(struct, written + given)
 
 
-def listen(reader: BagReader, mission: Mission, library: Library, most: int | None = None) -> Calls:
+def listen(
+    reader: BagReader,
+    mission: Mission,
+    library: Library,
+    most: int | None = None,
+    through: Callable[[Callable[..., Any]], Callable[..., Any]] | None = None,
+    *,
+    big_endian: bool = False,
+) -> Calls:
     """The calls of a library's kernel in a recorded flight.
+
+    Args:
+        reader: of the recording.
+        mission: that flew.
+        library: of the kernel.
+        most: steps.
+        through: gives what is asked in the place of the kernel.
+        big_endian: hashes of the state as such a processor has it are wanted, too.
 
     Raises:
         ExportError: the recording lacks the inputs of the component.
     """
-    listener = Listener(library, most)
+    listener = Listener(library, most, big_endian=big_endian)
     node = mission.node(library.function.component)
     stepper = Stepper(node.component, node.name, node.canonical, mission.events, mission.epoch_ns)
+    if through is not None:
+        attach(stepper.component, library.function.attribute, through)
     attach(stepper.component, library.function.attribute, listener.around)
     flown = _recorded(reader, node)
     for stamp_ns, received in _cycles(reader, node, stepper):

@@ -1,146 +1,190 @@
 # SPDX-License-Identifier: Apache-2.0
 """A library in the place of the compiled function of a component: the processor in the loop, or somebody's own code.
 
-A shared library is called in this process. A program such as `sunpoint_NAME_main` is spoken to through pipes, in an
-emulator where it is another processor's. Both get the structs of `sunpoint_NAME.h` and are asked for those back: what
-gives the structs of that header flies, whoever wrote it.
+A program such as `sunpoint_NAME_main` is spoken to through pipes, in an emulator where it is another processor's; a
+shared library likewise, by a process that loads it, so that its faults end that alone. Both get the structs of
+`sunpoint_NAME.h` and are asked for those back: what gives the structs of that header flies, whoever wrote it.
 """
 
-import ctypes
+import contextlib
+import platform
 import shutil
+import signal
 import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numba
 import numpy as np
 
 from css_common.component import Component
+from css_common.component_error import ComponentError
 from css_common.mission import Node
-from css_export.c_main import BEGIN, PARAMETERS, STEP, word
+from css_export.c_main import LAYOUT, PARAMETERS, STATE, STEP, word
 from css_export.entry import Interface, interface_of
 from css_export.errors import ExportError
 from css_export.flown import INPUT, MEMORY, OUTPUT, Function, fresh, functions_of
 from css_export.flown import PARAMETERS as PARAMETERS_ROLE
 from css_export.flown import STATE as STATE_ROLE
-from css_export.layout import Struct, pack, unpack
+from css_export.layout import Struct, layout_number, pack, unpack
 from css_export.names import prefix_of
 from css_export.recorded_calls import attach
 from css_export.targets import TARGETS
 
 _ELF_PROGRAM, _ELF_SHARED = 2, 3
+_unnamed: set[Path] = set()  # of which it has been said that they have no number of their structs
+_HERE = platform.machine()
 _MACHINES = {62: "x86_64", 183: "aarch64", 243: "riscv64", 40: "armv7"}
 
 
-class Processor(Protocol):
-    """What makes steps: bytes of structs in, bytes of structs out."""
-
-    def step(self, parameters: bytes, state: bytes, inputs: bytes) -> tuple[bytes, bytes]:
-        """State after a step and its outputs."""
-
-
-class SharedLibrary:
-    """Called in this process."""
+class Processor:
+    """A program, or a shared library in a process of its own, spoken to through pipes; it keeps the state itself."""
 
     def __init__(self, file: Path, prefix: str, structs: dict[str, Struct]) -> None:
-        """Loads a shared library.
+        """Starts it.
 
         Raises:
-            ExportError: it cannot be loaded, or lacks the step.
+            ExportError: it cannot be started, or was made for other structs.
         """
-        self._step = loaded_step(file, prefix)
-        self._outputs = structs[OUTPUT].size
-
-    def step(self, parameters: bytes, state: bytes, inputs: bytes) -> tuple[bytes, bytes]:
-        """State after a step and its outputs."""
-        places = [_place(data) for data in (parameters, state, inputs, bytes(self._outputs))]
-        self._step(*(ctypes.c_void_p(place.ctypes.data) for place in places))
-        return places[1].tobytes(), places[3].tobytes()
-
-
-def loaded_step(file: Path, prefix: str) -> Any:
-    """The step of a shared library.
-
-    Raises:
-        ExportError: it cannot be loaded, or lacks it.
-    """
-    try:
-        step = getattr(ctypes.CDLL(str(file.absolute())), f"{prefix}_step")
-    except (OSError, AttributeError) as error:
-        raise ExportError(f"{file}: {error}") from error
-    step.restype = None
-    return step
-
-
-def _place(data: bytes) -> np.ndarray:
-    """A copy that begins where any struct may."""
-    place = np.zeros(len(data) // 8 + 1, np.uint64).view(np.uint8)[: len(data)]
-    place[:] = np.frombuffer(data, np.uint8)
-    return place
-
-
-class Program:
-    """Spoken to through pipes; it keeps the state itself."""
-
-    def __init__(self, file: Path, structs: dict[str, Struct], fresh_state: bytes) -> None:
-        """Starts a program.
-
-        Raises:
-            ExportError: it cannot be started.
-        """
-        head = file.read_bytes()[:20]
-        target = TARGETS.get(_MACHINES.get(int.from_bytes(head[18:20], "little"), ""))
-        if target is None:
-            raise ExportError(f"{file}: of a processor for which no emulator is known")
-        if target.emulator and shutil.which(target.emulator) is None:
-            raise ExportError(f"{file}: {target.emulator} is not installed: apt-get install qemu-user-static")
-        command = [*([target.emulator] if target.emulator else []), str(file.absolute()), "state"]
+        self._file = file
+        roles = (PARAMETERS_ROLE, STATE_ROLE, INPUT, OUTPUT)
+        sizes = [structs[role].size for role in roles]
         try:
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            self._process = subprocess.Popen(
+                _command(file, prefix, sizes),
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,  # an interrupt is for the flight, which then closes the pipe
+            )
         except OSError as error:
             raise ExportError(f"{file}: {error.strerror}") from error
         self._sizes = [structs[OUTPUT].size, 8, structs[STATE_ROLE].size]
-        self._fresh = self._state = fresh_state
-        self._parameters = b""
-        self._file = file
+        self._state: bytes | None = None
+        self._parameters: bytes | None = None
+        try:
+            (number,) = self._answers(word(LAYOUT), [8])
+        except ComponentError as error:
+            raise ExportError(f"{error}, asked for the number of its structs") from error
+        self._refuse_other(prefix, int.from_bytes(number, "little"), layout_number(structs))
+
+    def _refuse_other(self, prefix: str, number: int, expected: int) -> None:
+        if number == 0 and self._file not in _unnamed:
+            _unnamed.add(self._file)
+            print(
+                f"{self._file}: has no {prefix}_layout, so that nobody knows for which structs it was made; taken for "
+                "those of this mission",
+                file=sys.stderr,
+            )
+        if number not in (0, expected):
+            raise ExportError(
+                f"{self._file}: made for other structs ({prefix}_layout is {number:#018x}, of this mission "
+                f"{expected:#018x}); expected one made with the header that `export` writes for this mission"
+            )
 
     def step(self, parameters: bytes, state: bytes, inputs: bytes) -> tuple[bytes, bytes]:
         """State after a step and its outputs.
 
         Raises:
-            ExportError: the program ended, or is to go on from a state that it does not have.
+            ComponentError: it ended.
         """
         asked = b""
-        if state != self._state:
-            if state != self._fresh:
-                raise ExportError(f"{self._file}: it cannot be given a state")
-            asked += word(BEGIN)
         if parameters != self._parameters:
             asked += word(PARAMETERS) + parameters
             self._parameters = parameters
+        if state != self._state:
+            asked += word(STATE) + state
+        output, _, self._state = self._answers(asked + word(STEP) + inputs, self._sizes)
+        return self._state, output
+
+    def _answers(self, asked: bytes, sizes: list[int]) -> list[bytes]:
         pipe_in, pipe_out = self._process.stdin, self._process.stdout
         assert pipe_in is not None and pipe_out is not None
         try:
-            pipe_in.write(asked + word(STEP) + inputs)
+            pipe_in.write(asked)
             pipe_in.flush()
-        except OSError as error:
-            raise ExportError(f"{self._file}: it ended") from error
-        output, _, self._state = (pipe_out.read(size) for size in self._sizes)
-        if len(self._state) != self._sizes[2]:
-            raise ExportError(f"{self._file}: it ended")
-        return self._state, output
+            given = [pipe_out.read(size) for size in sizes]
+        except (OSError, ValueError):  # closed by the other side, or by this one since that ended
+            given = []
+        if [len(data) for data in given] != sizes:
+            raise ComponentError(f"{self._file}: {self._end()}")
+        return given
+
+    def _end(self) -> str:
+        self.close()
+        code = self._process.returncode
+        return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
 
     def close(self) -> None:
         """Ends the program, which it does when nothing more can come."""
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
-                pipe.close()
+                with contextlib.suppress(OSError):
+                    pipe.close()
         self._process.wait()
 
     def __del__(self) -> None:
         if hasattr(self, "_process"):
             self.close()
+
+
+def _command(file: Path, prefix: str, sizes: list[int]) -> list[str]:
+    """What runs a file.
+
+    Raises:
+        ExportError: nothing here does.
+    """
+    name = _MACHINES.get(_elf(file)[1], "")
+    if _is_library(file):
+        if name != _HERE:
+            raise ExportError(
+                f"{file}: a shared library of {name or 'another processor'}, this machine is {_HERE}; a program for it "
+                "(sunpoint_NAME_main, of `make TARGET=...`) flies in an emulator"
+            )
+        server = [sys.executable, "-m", "css_export.library_server", str(file.absolute()), prefix]
+        return [*server, *map(str, sizes)]
+    target = TARGETS.get(name)
+    if target is None:
+        raise ExportError(f"{file}: of a processor for which no emulator is known")
+    if target.emulator and shutil.which(target.emulator) is None:
+        raise ExportError(f"{file}: {target.emulator} is not installed: apt-get install {target.emulator_package}")
+    return [*([target.emulator] if target.emulator else []), str(file.absolute()), "state"]
+
+
+def _is_library(file: Path) -> bool:
+    # a program that may lie anywhere is a shared object, too
+    return _elf(file)[0] == _ELF_SHARED and file.suffix == ".so"
+
+
+def _elf(file: Path) -> tuple[int, int]:
+    """Kind and processor of a program or library.
+
+    Raises:
+        ExportError: it is neither.
+    """
+    head = file.read_bytes()[:20]
+    kind, machine = (int.from_bytes(head[at : at + 2], "little") for at in (16, 18))
+    if head[:4] != b"\x7fELF" or kind not in (_ELF_PROGRAM, _ELF_SHARED):
+        raise ExportError(f"{file}: expected a shared library or a program")
+    return kind, machine
+
+
+def refuse_without_step(file: Path, prefix: str) -> None:
+    """Refuses a shared library that cannot be loaded, or lacks the step.
+
+    It is loaded in a process of its own: loading runs what is in it.
+
+    Raises:
+        ExportError: saying why.
+    """
+    text = "import ctypes, sys\ntry:\n    getattr(ctypes.CDLL(sys.argv[1]), sys.argv[2])\n"
+    text += "except (OSError, AttributeError) as error:\n    sys.exit(str(error))\n"
+    asked = [sys.executable, "-c", text, str(file.absolute()), f"{prefix}_step"]
+    done = subprocess.run(asked, capture_output=True, check=False)
+    if done.returncode != 0:
+        said = done.stderr.decode(errors="replace").strip().splitlines()
+        raise ExportError(f"{file}: {said[-1] if said else f'loading it ended with {done.returncode}'}")
 
 
 def stand_in(node: Node, file: str) -> type[Component]:
@@ -161,12 +205,15 @@ def stand_in(node: Node, file: str) -> type[Component]:
     path = Path(file)
     if not path.is_file():
         raise ExportError(f"--component {node.name}: {file}: no such file")
-    kind = _elf_kind(path)
-    if path.suffix == ".so":
-        loaded_step(path, prefix_of(function.name))
+    prefix = prefix_of(function.name)
+    _command(path, prefix, [])
+    if _is_library(path):
+        refuse_without_step(path, prefix)
+    # asked here for the number of its structs, before anything starts
+    library_step(function, function.kernel, path)
 
     def around(kernel: Callable[..., Any]) -> Callable[..., Any]:
-        return _Step(function, kernel, path, kind)
+        return library_step(function, kernel, path)
 
     class StandIn(node.component):  # type: ignore[name-defined]
         """A component with a library in it."""
@@ -183,30 +230,25 @@ def stand_in(node: Node, file: str) -> type[Component]:
     return StandIn
 
 
-def _elf_kind(file: Path) -> int:
-    head = file.read_bytes()[:20]
-    kind = int.from_bytes(head[16:18], "little") if head[:4] == b"\x7fELF" else 0
-    if kind not in (_ELF_PROGRAM, _ELF_SHARED):
-        raise ExportError(f"{file}: expected a shared library or a program")
-    return kind
+def library_step(function: Function, kernel: Callable[..., Any], file: Path) -> Callable[..., Any]:
+    """What a component calls in the place of its kernel: a library that is asked for each step.
+
+    Raises:
+        ExportError: the file is no library or program, cannot be loaded or started, or lacks the step.
+    """
+    return _Step(function, kernel, file)
 
 
 class _Step:
     """What a component calls in the place of its kernel."""
 
-    def __init__(self, function: Function, kernel: Callable[..., Any], file: Path, kind: int) -> None:
+    def __init__(self, function: Function, kernel: Callable[..., Any], file: Path) -> None:
         arguments = fresh(function)
         result = kernel(*arguments)
         output = result[1] if function.keeps_state else result
         self._function, self._like = function, output
         self._interface: Interface = interface_of(function, numba.typeof(output))
-        structs = self._interface.structs
-        is_program = kind == _ELF_PROGRAM or file.suffix != ".so"
-        self._processor: Processor = (
-            Program(file, structs, bytes(self._packed(STATE_ROLE, function.sample)))
-            if is_program
-            else SharedLibrary(file, prefix_of(function.name), structs)
-        )
+        self._processor = Processor(file, prefix_of(function.name), self._interface.structs)
 
     def _packed(self, role: str, arguments: tuple[Any, ...]) -> bytearray:
         function, struct_ = self._function, self._interface.structs[role]

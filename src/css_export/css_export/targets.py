@@ -19,6 +19,8 @@ class Target(NamedTuple):
         flags: for that compiler.
         package: of Debian that brings it.
         emulator: that runs such a program here; "": the program runs as it is.
+        machine: that the emulator has for it, where it is one of whole machines; "": one of programs.
+        emulator_package: of Debian that brings the emulator.
         big_endian: its numbers begin with the most significant byte.
         runs: a program for it can be run here, with the emulator.
     """
@@ -32,6 +34,8 @@ class Target(NamedTuple):
     flags: tuple[str, ...] = ()
     package: str = ""
     emulator: str = ""
+    machine: str = ""
+    emulator_package: str = "qemu-user-static"
     big_endian: bool = False
     runs: bool = True
 
@@ -73,7 +77,9 @@ _TARGETS = (
         compiler="arm-none-eabi-gcc",
         flags=("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
         package=_BARE,
-        runs=False,
+        emulator="qemu-system-arm",
+        machine="mps2-an500",
+        emulator_package="qemu-system-arm",
     ),
     Target(
         "cortex-m4",
@@ -83,9 +89,20 @@ _TARGETS = (
         compiler="arm-none-eabi-gcc",
         flags=("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=soft"),
         package=_BARE,
-        runs=False,
+        emulator="qemu-system-arm",
+        machine="mps2-an386",
+        emulator_package="qemu-system-arm",
     ),
-    Target("leon3", "sparc-unknown-elf", "leon3", big_endian=True, runs=False),
+    Target(
+        "leon3",
+        "sparc-unknown-elf",
+        "leon3",
+        compiler="sparc64-linux-gnu-gcc",
+        flags=("-m32", "-mcpu=leon3"),
+        package="gcc-sparc64-linux-gnu gcc-multilib-sparc64-linux-gnu libc6-dev-sparc-sparc64-cross",
+        emulator="qemu-sparc32plus-static",
+        big_endian=True,
+    ),
 )
 TARGETS = {target.name: target for target in _TARGETS}
 HOST = "x86_64"

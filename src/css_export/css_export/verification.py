@@ -6,10 +6,12 @@ import struct
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from css_export.flown import OUTPUT
-from css_export.layout import Struct, leaves
+from css_export.c_main import PARAMETERS, STEP
+from css_export.flown import INPUT, OUTPUT
+from css_export.flown import PARAMETERS as PARAMETERS_ROLE
+from css_export.layout import Scalar, Struct, leaves, other_order, struct_of
 from css_export.library import Library
-from css_export.programs import compiled_program, run_program
+from css_export.programs import compiled_program, counted_run
 from css_export.recorded_calls import Calls
 from css_export.targets import Target
 
@@ -36,8 +38,10 @@ class Verdict:
         return max(self.largest.values(), default=0.0)
 
 
-def run_library(library: Library, target: Target, folder: Path, calls: Calls) -> bytes:
-    """What the program of a library writes for the calls of a flight.
+def run_library(library: Library, target: Target, folder: Path, calls: Calls) -> tuple[bytes, int | None]:
+    """What the program of a library writes for the calls of a flight, and instructions of its longest step.
+
+    Instructions are those of the step with all that it calls; None where the emulator counts none.
 
     Raises:
         ToolError: it cannot be compiled or run here.
@@ -45,12 +49,40 @@ def run_library(library: Library, target: Target, folder: Path, calls: Calls) ->
     place = folder / target.name
     program = place / f"{library.prefix}_main"
     source, packed = folder / f"{library.prefix}_main.c", place / f"lib{library.prefix}.a"
-    compiled_program(target, [source], [packed], program)
-    return run_program(target, program, bytes(calls.stream))
+    compiled_program(target, [source], [packed], program, f"{library.prefix}_step")
+    if not target.big_endian:
+        return counted_run(target, program, bytes(calls.stream))
+    written, instructions = counted_run(target, program, _stream_of_big_endian(library, calls))
+    output = library.interface.structs[OUTPUT]
+    record = struct_of("record", [("output", output), ("hash", Scalar("uint64_t", "Q", 8))])
+    return other_order(record, written[: len(written) // record.size * record.size]), instructions
 
 
-def judged(library: Library, calls: Calls, written: bytes) -> Verdict:
-    """What was written, held against what the kernel gave."""
+def _stream_of_big_endian(library: Library, calls: Calls) -> bytes:
+    """The calls for a processor whose numbers begin with the most significant byte."""
+    structs, stream = library.interface.structs, bytes(calls.stream)
+    layouts = {STEP: structs[INPUT], PARAMETERS: structs[PARAMETERS_ROLE]}
+    parts, at = [], 0
+    while at < len(stream):
+        (command,) = struct.unpack_from("<Q", stream, at)
+        size = layouts[command].size if command in layouts else 0
+        parts.append(struct.pack(">Q", command))
+        if size:
+            parts.append(other_order(layouts[command], stream[at + 8 : at + 8 + size]))
+        at += 8 + size
+    return b"".join(parts)
+
+
+def judged(library: Library, calls: Calls, written: bytes, *, big_endian: bool = False) -> Verdict:
+    """What was written, held against what the kernel gave.
+
+    Args:
+        library: that was run.
+        calls: of the flight.
+        written: as `run_library` gives it.
+        big_endian: by a processor whose numbers begin with the most significant byte.
+    """
+    hashes = calls.hashes_of_big_endian if big_endian else calls.hashes
     size = library.interface.structs[OUTPUT].size
     record = size + 8
     steps = min(len(written) // record, calls.steps)
@@ -60,7 +92,7 @@ def judged(library: Library, calls: Calls, written: bytes) -> Verdict:
         (state,) = struct.unpack_from("<Q", written, k * record + size)
         if output == calls.outputs[k]:
             verdict.equal_outputs += 1
-            verdict.equal += state == calls.hashes[k]
+            verdict.equal += state == hashes[k]
         else:
             _note(verdict.largest, library.interface.structs[OUTPUT], calls.outputs[k], output)
     return verdict

@@ -3,7 +3,9 @@
 
 from typing import NamedTuple
 
+from css_common.declared import builder, made, table_of
 from css_common.kernel import kernel
+from css_common.schema import choice
 from css_common.vectors import Mat3, Vec3, add, angle_between, dot, norm, scale, subtract, unit
 from css_estimation.attitude.triad import triad, triad_covariance_of
 from css_estimation.symmetric import Symmetric, isotropic, product, trace
@@ -16,6 +18,21 @@ ORDER_BEST = 0
 ORDER_SUN = 1
 ORDER_FIELD = 2
 """Which direction is the primary one: that which leaves the smaller covariance, or always the same."""
+
+_ORDERS = ("best", "sun", "field")
+
+
+class TriadParameters(NamedTuple):
+    """What is chosen of TRIAD."""
+
+    order: int = made(  # ORDER_*
+        _ORDERS.index,
+        choice("primary", "best", _ORDERS, "first direction of TRIAD; best: that with the smaller covariance"),
+    )
+
+
+PARAMETERS = table_of(TriadParameters)
+parameters = builder(TriadParameters)
 
 
 class SunFieldAttitude(NamedTuple):
@@ -89,3 +106,26 @@ def sun_field_attitude(
     if order == ORDER_FIELD or (order == ORDER_BEST and trace(of_field) < trace(of_sun)):
         return SunFieldAttitude(MODE_FIELD_FIRST, field_first, of_field, nis)
     return SunFieldAttitude(MODE_SUN_FIRST, sun_first, of_sun, nis)
+
+
+@kernel
+def measured_attitude(
+    p: TriadParameters,
+    sun_b: Vec3,
+    sun_covariance: Symmetric,
+    field_b: Vec3,
+    field_variance: float,
+    sun_n: Vec3,
+    field_n: Vec3,
+) -> SunFieldAttitude:
+    """TRIAD of Sun and field, as `sun_field_attitude`, of parameters.
+
+    Args:
+        sun_b: measured unit vector to the Sun
+        sun_covariance: of it, upper triangle by rows
+        field_b: [T] measured field at the same instant
+        field_variance: [T^2] of each component
+        sun_n: unit vector to the Sun from a model
+        field_n: [T] field from a model
+    """
+    return sun_field_attitude(sun_b, sun_covariance, field_b, field_variance, sun_n, field_n, p.order)

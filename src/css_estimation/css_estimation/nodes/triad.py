@@ -18,15 +18,11 @@ from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.attitude import cell_sun, flight_references, sun_field_attitude
-from css_estimation.attitude.sun_field_attitude import MODE_NONE, ORDER_BEST, ORDER_FIELD, ORDER_SUN, SunFieldAttitude
+from css_estimation.attitude.sun_field_attitude import MODE_NONE, SunFieldAttitude
 from css_estimation.messages import cells_input
 from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
 from css_sensors.calibrated_readings import CalibratedReadings, temperature_findings, temperature_inputs
-
-_ORDERS = {"best": ORDER_BEST, "sun": ORDER_SUN, "field": ORDER_FIELD}
-_PRIMARY = choice("primary", "best", tuple(_ORDERS), "first direction of TRIAD; best: that with the smaller covariance")
-
 
 _SUN_SOURCE = choice(
     "sun_source",
@@ -63,7 +59,7 @@ class Triad(Component):
     """
 
     shared = ("orbit", "magnetometer", "cells")
-    parameters = (flight_references.FIELD_DEGREE, _PRIMARY, _SUN_SOURCE, *cell_sun.PARAMETERS)
+    parameters = (flight_references.FIELD_DEGREE, *sun_field_attitude.PARAMETERS, _SUN_SOURCE, *cell_sun.PARAMETERS)
 
     @classmethod
     def inputs(cls, name: str, values: Values) -> tuple[Input, ...]:
@@ -99,14 +95,14 @@ class Triad(Component):
             self.values, field=True, field_degree=self.values[flight_references.FIELD_DEGREE]
         )
         self._spacing_ns = self.period_ns * self.values.magnetometer.divider
-        self._order = _ORDERS[self.values[_PRIMARY]]
+        self._p = sun_field_attitude.parameters(self.values)
         self._samples: deque[_FieldSample] = deque(maxlen=64)
         self._sightings: deque[_Sighting] = deque(maxlen=64)
         self._newest: dict[str, Any] | None = None
         self._instant_ns = 0
         self._calibrated = CalibratedReadings(self.values)
         self._cell_sun = cell_sun.CellSun(self.values) if _is_by_cells(self.values) else None
-        self._attitude = typed_call(sun_field_attitude.sun_field_attitude)
+        self._attitude = typed_call(sun_field_attitude.measured_attitude)
         self._interpolated = typed_call(sun_field_attitude.interpolated_field)
         self._variance = typed_call(sun_field_attitude.interpolated_variance)
         self._quaternion = typed_call(dcm_to_quaternion)
@@ -115,7 +111,7 @@ class Triad(Component):
         self._interpolated(field_b, field_b, field_b, field_b, 0.5)
         self._variance(0.0, 1e-5, 0.1, 0.5)
         x = (1.0, 0.0, 0.0)
-        attitude = self._attitude(x, isotropic(0.0), field_b, 1e-14, x, field_b, self._order)
+        attitude = self._attitude(self._p, x, isotropic(0.0), field_b, 1e-14, x, field_b)
         self._quaternion(attitude.dcm_bn)
 
     def standing(self) -> Standing:
@@ -139,7 +135,7 @@ class Triad(Component):
             return False
         # a covariance of zeros is one that nobody knows
         variance = max(float(field.magnetic_field_covariance[0]), self._cell_sun.field_variance)
-        attitude = self._attitude(seen.sun_b, seen.covariance, field_b, variance, at.sun_n, at.field_n, self._order)
+        attitude = self._attitude(self._p, seen.sun_b, seen.covariance, field_b, variance, at.sun_n, at.field_n)
         return self._take(attitude, stamp_ns, 0.0, seen.mask)
 
     def _by_slits(self, stamp_ns: int, received: Received) -> bool:
@@ -180,9 +176,7 @@ class Triad(Component):
         turn = sighting.rate * self._spacing_ns * 1e-9
         variance = self._variance(max(sample.variance for sample in around), norm(field_b), turn, u)
         at = self._environment.at((sighting.instant_ns - self.epoch_ns) * 1e-9)
-        attitude = self._attitude(
-            sighting.sun_b, sighting.covariance, field_b, variance, at.sun_n, at.field_n, self._order
-        )
+        attitude = self._attitude(self._p, sighting.sun_b, sighting.covariance, field_b, variance, at.sun_n, at.field_n)
         return self._take(attitude, sighting.instant_ns, sighting.rate, 0)
 
     def _take(self, attitude: SunFieldAttitude, instant_ns: int, rate: float, lit_mask: int) -> bool:

@@ -15,7 +15,8 @@ def set_diagonal(root, variances) -> None:
         variances: (n,) or a tuple of n.
     """
     root[:, :] = 0.0
-    for i in range(root.shape[0]):
+    # their number, which the compiler knows of a tuple: else an index out of range is a way to an exception
+    for i in range(len(variances)):
         root[i, i] = math.sqrt(variances[i])
 
 

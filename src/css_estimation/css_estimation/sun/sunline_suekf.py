@@ -116,7 +116,8 @@ def move_point(x, axis: int, dt: float) -> None:
 def switch_axis(axis: int, memory: UnscentedMemory) -> int:
     """The axis to go on with; where it is another one, the rates and the root are turned into its frame."""
     sun_b = unit(direction_of(memory))
-    if abs(sun_b[axis]) <= _NEAR_AXIS:
+    # not sun_b[axis]: for all that the compiler knows that may be out of range
+    if abs(sun_b[0] if axis == 0 else sun_b[1]) <= _NEAR_AXIS:
         return axis
     other = 1 - axis
     old2, old3 = rate_axes(sun_b, axis)

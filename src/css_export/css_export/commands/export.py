@@ -19,6 +19,7 @@ _EXAMPLES = (
     "okeefe_2013 --components ekf mrp_control -o flight_code",
     "okeefe_2013 --components ekf --target x86_64 aarch64 cortex-m7",
     "okeefe_2013 --components ekf --verify bags/okeefe_2013_0_20261122_125130 --json",
+    "okeefe_2013 --components ekf --target x86_64 armv7 --mathematics musl -o flight_code",
     "okeefe_2013 --components ekf --target powerpc-unknown-elf:750 -o flight_code",
 )
 _EXITS = {
@@ -46,6 +47,13 @@ def _parser() -> CommandParser:
         dest="targets",
         help="x86_64, aarch64, riscv64, armv7, cortex-m7, cortex-m4, leon3, or TRIPLE or TRIPLE:PROCESSOR as LLVM "
         "names them, of which objects alone are made (default: x86_64)",
+    )
+    add(
+        "--mathematics",
+        choices=("target", "musl"),
+        default="target",
+        help="whose sine, cosine and others: target: of the C library that the image is linked with; musl: one "
+        "implementation in the library itself, so that all targets agree to the last bit (default: target)",
     )
     add("-o", "--out", type=Path, metavar="DIR", help="folder of the libraries (default: export/MISSION)")
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter")

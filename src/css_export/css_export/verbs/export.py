@@ -4,51 +4,29 @@
 import argparse
 import json
 import sys
-from collections.abc import Iterable
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
-
-from css_analysis.readable_table import ReadableTable
 from css_common.mission import Mission, load_mission, mission_from_text
 from css_export.build_files import write_build_files
 from css_export.errors import ExportError, ToolError
 from css_export.flown import flying_functions, functions_of, left_out
 from css_export.glue import write_glue
-from css_export.library import Library, MachineCode, made_library, write_library
+from css_export.library import MUSL, Library, MachineCode, made_library, write_library
 from css_export.mathematics import differing_functions
 from css_export.programs import can_link, shared_library, why_not
 from css_export.recorded_calls import Calls, listen
-from css_export.targets import HOST, Target, target_of
-from css_export.verification import Verdict, judged, run_library
+from css_export.report import Row, print_report, result
+from css_export.speed import time_ratio
+from css_export.stand_in import library_step
+from css_export.targets import HOST, TARGETS, Target, target_of
+from css_export.verification import judged, run_library
 from css_recording.bag_reader import BagReader
 
 # what differs between flights of one mission
 _OF_THE_FLIGHT = {"mission.case", "mission.duration", "mission.seed"}
-
-# relative difference of outputs over a flight below which the last bits of mathematics are taken for its reason
-_LAST_BITS = 1e-12
-
-
-@dataclass
-class Row:
-    """A library for a target, and how it did."""
-
-    library: Library
-    code: MachineCode
-    verdict: Verdict | None = None
-    why_not: str | None = None
-    differing: dict[str, float] | None = None  # functions of the C library, by the share of arguments
-
-    @property
-    def is_right(self) -> bool:
-        """Every step is equal but for the last bits of named functions, or cannot be compared on any machine."""
-        if self.verdict is None:
-            return self.why_not is None or not self.code.target.runs
-        traced = bool(self.differing) and self.verdict.largest_relative_difference < _LAST_BITS
-        return self.verdict.equal == self.verdict.steps or traced
 
 
 def run(options: argparse.Namespace) -> int:
@@ -63,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     lines: list[str] = []
     for function in functions:
         _tell(f"{function.name}: compiling")
-        library = made_library(mission, function)
+        library = made_library(mission, function, options.mathematics)
         codes = []
         for target in targets:
             _tell(f"{function.name}: machine code for {target.name}")
@@ -77,10 +55,10 @@ def run(options: argparse.Namespace) -> int:
         rows += of_library
         if options.verify is not None:
             lines += _verify(of_library, options, mission, place)
-    missing = [] if options.components else left_out(mission)
-    _print(rows, options.verify is not None, folder, lines, missing)
+    missing = {} if options.components else left_out(mission)
+    print_report(rows, options.verify is not None, folder, lines, missing)
     if options.json:
-        print(json.dumps({"mission": mission.name, "results": [_result(row) for row in rows], "left_out": missing}))
+        print(json.dumps({"mission": mission.name, "results": [result(row) for row in rows], "left_out": missing}))
     return 0 if all(row.is_right for row in rows) and not lines else 1
 
 
@@ -125,15 +103,22 @@ def _refuse_other(bag: Path, mission: Mission) -> None:
 def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, place: Path) -> list[str]:
     library = rows[0].library
     _tell(f"{library.function.name}: the calls of the flight")
-    with BagReader(options.verify) as reader:
-        calls = listen(reader, mission, library, options.steps)
+    with tempfile.TemporaryDirectory() as folder, BagReader(options.verify) as reader:
+        through = reference_of(library, Path(folder)) if library.mathematics == MUSL else None
+        big = any(row.code.target.big_endian for row in rows)
+        calls = listen(reader, mission, library, options.steps, through, big_endian=big)
     lines = _shortcomings(library, calls, options)
     for row in rows:
+        row.messages, row.as_recorded = calls.messages, calls.as_recorded
         row.why_not = why_not(row.code.target)
         if row.why_not is None:
             _tell(f"{library.function.name}: {calls.steps} steps on {row.code.target.name}")
             try:
-                row.verdict = judged(library, calls, run_library(library, row.code.target, place, calls))
+                written, row.instructions = run_library(library, row.code.target, place, calls)
+                row.verdict = judged(library, calls, written, big_endian=row.code.target.big_endian)
+                shared = place / HOST / f"lib{library.prefix}.so"
+                if row.code.target.name == HOST and shared.is_file():
+                    row.time_ratio = time_ratio(library, shared, calls)
                 if row.verdict.equal != row.verdict.steps:
                     row.differing = differing_functions(row.code.contents.missing, row.code.target, place)
             except ToolError as error:
@@ -141,12 +126,27 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
     return lines
 
 
+def reference_of(library: Library, folder: Path) -> Callable[[Any], Any]:
+    """What puts the library itself, on this machine, in the place of the kernel: that has another mathematics.
+
+    Raises:
+        ToolError: no compiler links it.
+    """
+    host = TARGETS[HOST]
+    if not can_link(host):
+        raise ToolError(f"{library.function.name}: nothing to compare with: {why_not(host)}")
+    write_library(library, [library.for_target(host)], folder)
+    packed = folder / HOST / f"lib{library.prefix}.a"
+    file = shared_library(host, packed, packed.with_suffix(".so"))
+    return lambda kernel: library_step(library.function, kernel, file)
+
+
 def _shortcomings(library: Library, calls: Calls, options: argparse.Namespace) -> list[str]:
     name = library.function.name
     lines = []
     if calls.steps == 0:
         lines.append(f"{name}: the recording has no step of it")
-    if calls.as_recorded != calls.messages:
+    if calls.as_recorded != calls.messages and library.mathematics != MUSL:
         lines.append(
             f"{name}: {calls.messages - calls.as_recorded} of {calls.messages} messages of the kernel here are not the "
             "bytes that were recorded: other software, or parameters that were set in flight"
@@ -158,73 +158,3 @@ def _shortcomings(library: Library, calls: Calls, options: argparse.Namespace) -
 
 def _tell(text: str) -> None:
     print(f"export: {text} ...", file=sys.stderr, flush=True)
-
-
-def _print(rows: list[Row], verified: bool, folder: Path, lines: list[str], missing: list[str]) -> None:
-    console = Console(highlight=False)
-    table = ReadableTable("C libraries, sizes in bytes")
-    table.add_name("library")
-    table.add_name("target")
-    for heading in ("code", "read-only\ndata", "state", "stack"):
-        table.add_number(heading)
-    if verified:
-        for heading in ("steps", "equal", "largest\ndifference"):
-            table.add_number(heading)
-    for row in rows:
-        table.add_texts(_texts(row, verified))
-    console.print(table)
-    for row in rows:
-        if row.why_not is not None:
-            console.print(
-                f"{row.library.function.name} on {row.code.target.name}: not run: {row.why_not}", soft_wrap=True
-            )
-        if row.differing is not None:
-            told = ", ".join(f"{name} ({100.0 * share:.2f} %)" for name, share in row.differing.items())
-            why = f"its C library gives other bits than that of this machine: {told}" if told else "no function of the "
-            why += "" if told else "C library that it links gives other bits; the reason lies in the code"
-            console.print(f"{row.library.function.name} on {row.code.target.name}: {why}", soft_wrap=True)
-    for line in lines:
-        console.print(line, soft_wrap=True)
-    for library in {row.library.prefix: row.library for row in rows}.values():
-        for row in rows:
-            if row.library is library:
-                linked = ", ".join(row.code.contents.missing) or "nothing"
-                console.print(f"{library.function.name} on {row.code.target.name} links {linked}", soft_wrap=True)
-    for name in missing:
-        console.print(f"{name}: left out, it has no compiled function that flies", soft_wrap=True)
-    console.print(f"written: {folder}", soft_wrap=True)
-
-
-def _texts(row: Row, verified: bool) -> list[str]:
-    code = row.code
-    texts = [row.library.function.name, code.target.name, f"{code.contents.code}", f"{code.contents.constants}"]
-    texts += [f"{row.library.interface.structs['state'].size}", f"{code.stack}"]
-    if verified:
-        v = row.verdict
-        texts += ["-", "-", "-"] if v is None else [f"{v.steps}", f"{v.equal}", f"{v.largest_relative_difference:.1e}"]
-    return texts
-
-
-def _result(row: Row) -> dict[str, Any]:
-    contents, verdict = row.code.contents, row.verdict
-    compared: dict[str, Any] = {"steps": None, "equal_steps": None, "largest_relative_difference": None}
-    if verdict is not None:
-        largest = verdict.largest_relative_difference
-        compared = {
-            "steps": verdict.steps,
-            "equal_steps": verdict.equal,
-            "largest_relative_difference": largest if largest != float("inf") else "infinite",
-        }
-    return {
-        "component": row.library.function.name,
-        "target": row.code.target.name,
-        **compared,
-        "code_bytes": contents.code,
-        "rodata_bytes": contents.constants,
-        "data_bytes": contents.variables,
-        "state_bytes": row.library.interface.structs["state"].size,
-        "stack_bytes": row.code.stack,
-        "linked": contents.missing,
-        "not_run": row.why_not,
-        "differing_functions": row.differing,
-    }
