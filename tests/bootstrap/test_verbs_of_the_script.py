@@ -59,7 +59,7 @@ def test_a_sourced_jazzy_is_used_on_any_machine(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     asked = []
 
-    def prepare(_project, ros, base, _with_tests):
+    def prepare(_project, ros, base, *_):
         asked.append((ros, host.system_python(base)))
         raise Refusal("far enough")
 

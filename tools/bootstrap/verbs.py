@@ -17,12 +17,14 @@ class Verb(NamedTuple):
     """One verb; without a package it is done by the bootstrap itself.
 
     `ros`: it puts nodes on topics, or tests those, and is refused where there is no ROS.
+    `extra`: it alone needs what requirements-EXTRA.lock names, installed when it is first asked for.
     """
 
     summary: str
     package: str = ""
     executable: str = ""
     ros: bool = False
+    extra: str = ""
 
 
 VERBS = {
@@ -52,6 +54,7 @@ VERBS = {
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
     "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
+    "docs": Verb("build the documentation, a site that needs no network", "css_docs", "docs", extra="docs"),
     "test": Verb("run the linters and the tests; FILE ...: those alone, -m long: the longest", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
