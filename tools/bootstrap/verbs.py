@@ -55,6 +55,9 @@ VERBS = {
     "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
     "docs": Verb("build the documentation, a site that needs no network", "css_docs", "docs", extra="docs"),
+    "completion": Verb(
+        "print completion of verbs and options for bash or zsh", "css_docs", "completion", extra="completion"
+    ),
     "test": Verb("run the linters and the tests; FILE ...: those alone, -m long: the longest", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),

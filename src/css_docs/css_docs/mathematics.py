@@ -15,6 +15,7 @@ _log = logging.getLogger(__name__)
 def setup(app: Sphinx) -> dict[str, Any]:
     """Tells Sphinx of this renderer (`html_math_renderer`)."""
     app.add_html_math_renderer(NAME, (_inline, _nothing), (_block, _nothing))
+    app.connect("doctree-resolved", _set_all)
     return {"version": "1", "parallel_read_safe": True, "parallel_write_safe": True}
 
 
@@ -37,21 +38,23 @@ def mathml(latex: str, display: str) -> str:
     return made
 
 
-def _set(node: nodes.Node, display: str) -> str:
-    try:
-        return mathml(node.astext(), display)
-    except ValueError as error:
-        _log.warning("%s", error, location=node)
-        return ""
+def _set_all(app: Sphinx, doctree: nodes.document, name: str) -> None:
+    """Sets all equations of a page, whatever is built: what cannot be set is a warning of every build."""
+    for kind, display in ((nodes.math, "inline"), (nodes.math_block, "block")):
+        for node in doctree.findall(kind):
+            try:
+                node[NAME] = mathml(node.astext(), display)
+            except ValueError as error:
+                _log.warning("%s", error, location=node)
 
 
-def _inline(writer: Any, node: nodes.Node) -> None:
-    writer.body.append(_set(node, "inline"))
+def _inline(writer: Any, node: nodes.Element) -> None:
+    writer.body.append(node.get(NAME, ""))
     raise nodes.SkipNode
 
 
-def _block(writer: Any, node: nodes.Node) -> None:
-    writer.body.append(f'<div class="math">{_set(node, "block")}</div>\n')
+def _block(writer: Any, node: nodes.Element) -> None:
+    writer.body.append(f'<div class="math">{node.get(NAME, "")}</div>\n')
     raise nodes.SkipNode
 
 

@@ -32,17 +32,29 @@ class Site(NamedTuple):
     seconds: float
 
 
-def build_site(
-    root: Path, work: Path, output: Path, *, figures: bool, fresh: bool, tell: Callable[[str], None]
-) -> Site:
+class Wish(NamedTuple):
+    """What to build.
+
+    Attributes:
+        output: folder of the site.
+        figures: with the figures of algorithm pages.
+        fresh: read all pages anew.
+        check: read all pages and resolve what they link, and write nothing.
+    """
+
+    output: Path
+    figures: bool = True
+    fresh: bool = False
+    check: bool = False
+
+
+def build_site(root: Path, work: Path, wish: Wish, tell: Callable[[str], None]) -> Site:
     """Builds the site.
 
     Args:
         root: the repository.
         work: folder for what can be made again.
-        output: folder of the site.
-        figures: draw the figures of algorithm pages.
-        fresh: read all pages anew.
+        wish: what to build.
         tell: takes a line when something that takes time begins.
 
     Raises:
@@ -50,10 +62,11 @@ def build_site(
         DocsError: a link or a page does not fit the code.
     """
     began = time.monotonic()
-    source, doctrees = work / "source", work / "doctrees"
+    kind = "check" if wish.check else "site"
+    source, doctrees = work / kind / "source", work / kind / "doctrees"
     tell("making the reference")
-    stage = Stage(root, source)
-    drawn = drawn_figures(root, work / FIGURES, tell) if figures else {}
+    stage = Stage(root, source, show_sources=not wish.check)
+    drawn = drawn_figures(root, work / FIGURES, tell) if wish.figures else {}
     for name, file in drawn.items():
         stage.copy(file, PurePosixPath(FIGURES, f"{name}.svg"))
     for file in sorted((root / "docs" / "_static").iterdir()):
@@ -61,20 +74,21 @@ def build_site(
     stage.copy(root / "docs" / "conf.py", PurePosixPath("conf.py"))
     stage.lay_out(made_pages(root), additions(root, drawn.keys()))
     tell(f"building {stage.pages} pages")
-    if fresh:
+    if wish.fresh:
         shutil.rmtree(doctrees, ignore_errors=True)
-    _run_sphinx(source, output, doctrees, fresh)
-    return Site(output / INDEX, stage.pages, len(drawn), time.monotonic() - began)
+    _run_sphinx(source, wish, doctrees)
+    return Site(wish.output / INDEX, stage.pages, len(drawn), time.monotonic() - began)
 
 
-def _run_sphinx(source: Path, output: Path, doctrees: Path, fresh: bool) -> None:
+def _run_sphinx(source: Path, wish: Wish, doctrees: Path) -> None:
     warnings = io.StringIO()
     nocolor()
     try:
         with patch_docutils(str(source)), docutils_namespace():
             app = Sphinx(
-                srcdir=source, confdir=source, outdir=output, doctreedir=doctrees, buildername="html",
-                status=None, warning=warnings, freshenv=fresh, warningiserror=True,
+                srcdir=source, confdir=source, outdir=doctrees if wish.check else wish.output, doctreedir=doctrees,
+                buildername="dummy" if wish.check else "html", status=None, warning=warnings, freshenv=wish.fresh,
+                warningiserror=True,
             )  # fmt: skip
             app.build()
             failed = app.statuscode != 0

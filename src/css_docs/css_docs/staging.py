@@ -21,15 +21,17 @@ _FENCES = {"mermaid": "text", "sh": "bash", "": "text"}
 class Stage:
     """Writes files of the site's source; those that have not changed are left as they are, so that few are read anew."""
 
-    def __init__(self, root: Path, folder: Path) -> None:
+    def __init__(self, root: Path, folder: Path, show_sources: bool = True) -> None:
         """Begins to lay out.
 
         Args:
             root: the repository.
             folder: what Sphinx will read.
+            show_sources: files of the repository that are linked are shown; else their pages are empty.
         """
         self._root, self._folder = root, folder
         self._written = written_pages(root)
+        self._show_sources = show_sources
         self._kept: set[Path] = set()
         self._sources: set[PurePosixPath] = set()
         self._wrong: list[str] = []
@@ -116,6 +118,9 @@ class Stage:
             self._sources |= {path / p.name for p in inside}
             places = {p.name: links.relative(page, _source_page(self._root, path / p.name)) for p in inside}
             self._put(page, heading + "".join(f"- [{name}]({place})\n" for name, place in places.items()))
+            return
+        if not self._show_sources:
+            self._put(page, heading)
             return
         language = _LANGUAGES.get(path.suffix, "text")
         text = file.read_text(encoding="utf-8", errors="replace")

@@ -13,7 +13,7 @@ from css_common.command import CommandParser, command_parser, guarded, implement
 from css_common.mission_file import MissionError
 from css_docs.errors import BrokenPages, DocsError
 
-_EXAMPLES = ("", "--open", "-o /tmp/site --json")
+_EXAMPLES = ("", "--open", "-o /tmp/site --json", "--check")
 _EXITS = {1: "a page is wrong, or no browser could be started"}
 
 
@@ -26,6 +26,7 @@ def _parser() -> CommandParser:
         "--no-figures", action="store_false", dest="figures",
         help="leave out the figures of algorithm pages, which take longest; their places say so",
     )  # fmt: skip
+    add("--check", action="store_true", help="find what is wrong with the pages, and write no site")
     add("--fresh", action="store_true", help="read every page anew, whatever an earlier build left")
     add("--json", action="store_true", help="print {index, pages, figures, seconds} as one JSON object on the last line")
     return parser

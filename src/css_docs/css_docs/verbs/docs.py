@@ -22,16 +22,18 @@ def run(options: argparse.Namespace) -> int:
     if not (root / "docs" / "conf.py").is_file():
         raise DocsError(f"{root}: has no docs/conf.py, expected the folder of a checkout ({places.HOME})")
     try:
-        from css_docs.site import build_site
+        from css_docs.site import Wish, build_site
     except ModuleNotFoundError as error:
         raise DocsError(f"{error.name} is not installed; ./sunpoint docs installs what it needs") from error
     output = (options.output or places.results("site")).absolute()
     if output.is_file():
         raise DocsError(f"{output}: is a file, expected a folder")
+    wish = Wish(output, figures=options.figures and not options.check, fresh=options.fresh, check=options.check)
     with still_working("building the site"):
-        site = build_site(
-            root, places.scratch("docs"), output, figures=options.figures, fresh=options.fresh, tell=_tell
-        )
+        site = build_site(root, places.scratch("docs"), wish, _tell)
+    if options.check:
+        print(f"nothing is wrong with {site.pages} pages ({site.seconds:.0f} s)")
+        return 0
     print(f"site: {site.index} ({site.pages} pages, {site.figures} figures, {site.seconds:.0f} s)")
     opened = not options.open or webbrowser.open(site.index.as_uri())
     if not opened:
