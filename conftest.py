@@ -62,6 +62,7 @@ _LONG = (
     "tests/test_clark_safe_hold.py",
     "tests/test_components.py::test_messages_fit_their_types_and_come_again_the_same[sunline_",
     "tests/test_faults_in_flight.py::test_the_compiled_loop_flies_the_same",
+    "tests/test_documents.py::test_long_blocks_run",
     "tests/test_fresh_setup_without_ros.py",
     "tests/test_harm_in_faulted_flights.py",
     "tests/test_monte_carlo_flies_as_the_graph.py::test_every_step_of_a_case_equals_that_of_the_composed_graph[s",
@@ -69,6 +70,7 @@ _LONG = (
     "tests/test_monte_carlo_flies_as_the_graph.py::test_torque_rods_without_wheels_and_gyro_equal_the_composed_graph",
     "tests/test_own_estimator.py::test_the_compiled_loop_flies_the_same",
     "tests/test_replay_stretches.py",
+    "tests/test_site.py::TestWhole",
     "tests/test_three_hosts.py",
 )
 
