@@ -96,7 +96,7 @@ def test_what_a_verb_alone_needs_is_locked_and_not_asked_for_by_its_help(monkeyp
     for extra in extras.values():
         lock = (Path(__file__).parents[2] / f"requirements-{extra}.lock").read_text(encoding="utf-8")
         assert lock.count("--hash=sha256:") >= lock.count("==") > 0
-    asked = []
+    asked: list[Any] = []
     monkeypatch.setattr(cli, "find_need", lambda *given: noted(asked, given[-1], False))
     monkeypatch.setattr(cli, "_replace_process", lambda command, env: noted(asked, env.get("PYTHONPATH", ""), 0))
     assert main(["docs", "--help"]) == 0

@@ -128,7 +128,8 @@ def _figure(page: AlgorithmPage, name: str) -> str:
     caption = importlib.import_module(f"css_docs.figures.{name}").CAPTION
     place = relative(page.page, PurePosixPath(FIGURES, f"{name}.svg"))
     source = f"src/css_docs/css_docs/figures/{name}.py"
-    return f"```{{figure}} {place}\n:alt: {caption.split('.')[0]}\n\n{caption}\n```\n\nDrawn by [{source}]({REPOSITORY}{source}).\n"
+    figure = f"```{{figure}} {place}\n:alt: {caption.split('.')[0]}\n\n{caption}\n```\n"
+    return f"{figure}\nDrawn by [{source}]({REPOSITORY}{source}).\n"
 
 
 def _module(name: str, root: Path) -> Iterator[str]:

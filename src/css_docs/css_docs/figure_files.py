@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures of algorithm pages: each is a module in `figures/` that draws it, kept until code that it is drawn by changes."""
+"""Figures of algorithm pages: a module of `figures/` draws each; kept until code that it is drawn by changes."""
 
 import importlib
 import pkgutil

@@ -34,7 +34,7 @@ def mathml(latex: str, display: str) -> str:
     except Exception as error:  # the converter has a dozen kinds of its own, without a common one
         raise ValueError(f"{type(error).__name__} in the equation {latex!r}") from error
     if "\\" in made:
-        raise ValueError(f"{made[made.index(chr(92)):].split('<')[0]} is not known, in the equation {latex!r}")
+        raise ValueError(f"{made[made.index(chr(92)) :].split('<')[0]} is not known, in the equation {latex!r}")
     return made
 
 

@@ -26,7 +26,7 @@ INDEX = "index.html"
 class Site(NamedTuple):
     """What was built."""
 
-    index: Path
+    file: Path  # to begin with
     pages: int
     figures: int
     seconds: float

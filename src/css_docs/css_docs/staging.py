@@ -12,14 +12,15 @@ REPOSITORY = "repo:"
 """Before the target of a link in a page that is made: a path in the repository."""
 
 _LANGUAGES = {
-    ".py": "python", ".yaml": "yaml", ".yml": "yaml", ".sh": "bash", ".c": "c", ".h": "c", ".toml": "toml", ".xml": "xml",
+    ".py": "python", ".yaml": "yaml", ".yml": "yaml", ".sh": "bash", ".c": "c", ".h": "c", ".toml": "toml",
+    ".xml": "xml",
 }  # fmt: skip
 _PICTURES = {".png", ".svg", ".jpg"}
 _FENCES = {"mermaid": "text", "sh": "bash", "": "text"}
 
 
 class Stage:
-    """Writes files of the site's source; those that have not changed are left as they are, so that few are read anew."""
+    """Writes the source of the site; files that have not changed are left alone, so that few are read anew."""
 
     def __init__(self, root: Path, folder: Path, show_sources: bool = True) -> None:
         """Begins to lay out.

@@ -30,7 +30,7 @@ def scripts(tmp_path_factory):
     folder = tmp_path_factory.mktemp("completion")
     env = {name: value for name, value in os.environ.items() if name != "SUNPOINT_VERB"}
     for shell in SHELLS:
-        command = [ROOT / "sunpoint", "completion", shell]
+        command = [str(ROOT / "sunpoint"), "completion", shell]
         done = subprocess.run(command, capture_output=True, text=True, check=True, env=env, timeout=300)
         (folder / shell).write_text(done.stdout)
     return folder

@@ -47,8 +47,9 @@ def test_every_parameter_stands_on_the_page_of_its_node_or_among_the_mission_key
         own = page(made, "nodes", package, f"{name}.md")
         for parameter in kind.table():
             assert f"| `{parameter.name}`" in (keys if parameter.name in shared else own), (name, parameter.name)
-        for port in (*kind.inputs(name, _values(kind)), *kind.outputs(name, _values(kind))):
-            assert f"| `{port.topic}` |" in own
+        ports = [*kind.inputs(name, _values(kind)), *kind.outputs(name, _values(kind))]
+        for topic in [port.topic for port in ports]:
+            assert f"| `{topic}` |" in own
 
 
 def _values(kind):
@@ -100,7 +101,7 @@ def test_every_node_that_flies_is_told_of_on_a_page_of_an_algorithm():
 
 def test_pages_of_algorithms_name_what_there_is():
     modules, figures = algorithm_pages.all_modules(ROOT), figure_names()
-    used = []
+    used: list[str] = []
     for p in algorithm_pages.algorithm_pages(ROOT):
         for pattern in p.patterns:
             one = algorithm_pages.AlgorithmPage(p.page, (pattern,), (), ())

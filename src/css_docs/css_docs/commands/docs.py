@@ -28,7 +28,9 @@ def _parser() -> CommandParser:
     )  # fmt: skip
     add("--check", action="store_true", help="find what is wrong with the pages, and write no site")
     add("--fresh", action="store_true", help="read every page anew, whatever an earlier build left")
-    add("--json", action="store_true", help="print {index, pages, figures, seconds} as one JSON object on the last line")
+    add(
+        "--json", action="store_true", help="print {index, pages, figures, seconds} as one JSON object on the last line"
+    )
     return parser
 
 

@@ -8,8 +8,8 @@ from css_analysis.figure_style import COLOURS, new_figure
 from css_docs.figures._flights import DEG, finish, fly
 
 CAPTION = """\
-The x axis of the gyro gets a bias of 1 deg/s at 120 s: error of the rate that the Sun estimator gives the control, with the health of the
-gyro and without; `okeefe_2013`, case 7."""
+The x axis of the gyro gets a bias of 1 deg/s at 120 s: error of the rate that the Sun estimator gives the control,
+with the health of the gyro and without; `okeefe_2013`, case 7."""
 
 
 def figure() -> Figure:

@@ -11,8 +11,8 @@ from css_environment.earth_light import LIGHT, PATCHES, SIZE, X, Y, Z, new_earth
 from css_environment.mission_environment import MissionEnvironment
 
 CAPTION = """\
-Light of the Earth along the orbit of `okeefe_2013`, as a cell that faces it would read: sum over the patches of light, and the one vector of Benton;
-reflectivity 0.3 everywhere. Toward the terminator the vector is too bright."""
+Light of the Earth along the orbit of `okeefe_2013`, as a cell that faces it would read: sum over the patches of
+light, and the one vector of Benton; reflectivity 0.3 everywhere. Toward the terminator the vector is too bright."""
 
 
 def figure() -> Figure:

@@ -10,8 +10,8 @@ from css_analysis.flight_series import error_series
 from css_docs.figures._flights import finish, fly
 
 CAPTION = """\
-Attitude of a tumbling cubesat with four photodiodes in a plane, by the Sun as a vector of lit cells and by the voltages one by one;
-`cubesat_vmm`, case 2. Four cells in a plane make no vector: that filter lives on the field."""
+Attitude of a tumbling cubesat with four photodiodes in a plane, by the Sun as a vector of lit cells and by the
+voltages one by one; `cubesat_vmm`, case 2. Four cells in a plane make no vector: that filter lives on the field."""
 
 
 def figure() -> Figure:

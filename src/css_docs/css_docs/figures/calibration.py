@@ -16,8 +16,9 @@ from css_monte_carlo.direct_flight import fly_and_keep
 from css_sim import cell_errors, cell_screen
 
 CAPTION = """\
-Scale of each cell by the calibration of a tumble of 40 minutes without control, three sigma, and the true one; errors of 10 % from cell to cell,
-a loss of up to 5 % at every step (2.5 % on average), under clouds that the calibration does not know."""
+Scale of each cell by the calibration of a tumble of 40 minutes without control, three sigma, and the true one;
+errors of 10 % from cell to cell, a loss of up to 5 % at every step (2.5 % on average), under clouds that the
+calibration does not know."""
 
 _MISSION = """
 /**:

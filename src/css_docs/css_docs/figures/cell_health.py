@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from css_docs.figures._flights import fly, headings
 
 CAPTION = """\
-Cell 5, which looks away from the Sun, sticks at 0.8 from 150 s on: the Kalman filter behind the health of the cells, and without it;
-`okeefe_2013`, case 7. Held for failed the cell counts as missing."""
+Cell 5 sticks at 0.8 from 150 s on: heading of the Kalman filter behind the health of the cells, and without it,
+where the flight follows the cell; `okeefe_2013`, case 7. Held for failed the cell counts as missing."""
 
 
 def figure() -> Figure:

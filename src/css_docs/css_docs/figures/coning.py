@@ -10,8 +10,9 @@ from css_estimation.spin.coning_spectrum import fourier_spectrum, sampling_rate
 from css_papers.esprit.spinning import fly_spinning
 
 CAPTION = """\
-Amplitude of the Sun angles of `esprit_2006` from the booms to 130 s, one sample a turn. Below half of the sampling rate (solid line) there
-is one peak, of 1.63 Hz; it stands as well for its mirror, the 3.82 Hz that the payload really cones with (dashed)."""
+Amplitude of the Sun angles of `esprit_2006` from the booms to 130 s, one sample a turn. Below half of the sampling
+rate (solid line) there is one peak, of 1.63 Hz; it stands as well for its mirror, the 3.82 Hz that the payload
+really cones with (dashed)."""
 
 _FROM_S = 69.18
 

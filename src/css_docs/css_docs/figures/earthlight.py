@@ -6,12 +6,12 @@ from matplotlib.figure import Figure
 
 from css_analysis.estimate_errors import attitude_errors, attitude_sigmas
 from css_analysis.figure_style import BLUE, ORANGE, new_figure
-from css_docs.figures._flights import finish, fly
 from css_analysis.flight_series import error_series
+from css_docs.figures._flights import finish, fly
 
 CAPTION = """\
-Error of the attitude about all three axes without a magnetometer, and its own bound; `okeefe_earthlight`, case 1. It begins when one turn
-about the Sun line is left."""
+Error of the attitude about all three axes without a magnetometer, and its own bound; `okeefe_earthlight`, case 1.
+It begins when one turn about the Sun line is left."""
 
 
 def figure() -> Figure:
@@ -23,5 +23,6 @@ def figure() -> Figure:
     axes.plot(*error_series(log, steps, errors), color=BLUE, label="error")
     at, sigmas = attitude_sigmas(log, "earthlight")
     axes.plot(*error_series(log, at, 3.0 * np.asarray(sigmas)), color=ORANGE, linestyle="--", label="3 sigma")
-    finish(axes, log, "attitude error [deg]")
+    axes.set_ylim(bottom=0.0)
+    finish(axes, log, "attitude error [deg]", logarithmically=False)
     return figure

@@ -9,8 +9,8 @@ from css_common.mission import load_mission
 from css_environment.mission_environment import MissionEnvironment
 
 CAPTION = """\
-`okeefe_2013`: strength of the magnetic field (IGRF-14) over one orbit, shadow in grey, and the visible fraction of the Sun's disc as it sets,
-against the cylindrical shadow."""
+`okeefe_2013`: strength of the magnetic field (IGRF-14) over one orbit, shadow in grey, and the visible fraction of
+the Sun's disc as it sets, against the cylindrical shadow."""
 
 
 def figure() -> Figure:
@@ -23,7 +23,9 @@ def figure() -> Figure:
     figure = new_figure(7.5, 3.0)
     left, right = figure.subplots(1, 2)
     left.plot(time / 60.0, [1e6 * np.linalg.norm(state.field_n) for state in states], color=BLUE)
-    left.fill_between(time / 60.0, 0.0, 1.0, where=light < 0.5, color=GREY, alpha=0.3, transform=left.get_xaxis_transform())
+    left.fill_between(
+        time / 60.0, 0.0, 1.0, where=light < 0.5, color=GREY, alpha=0.3, transform=left.get_xaxis_transform()
+    )
     left.set_xlabel("time [min]")
     left.set_ylabel("field [uT]")
     dusk = time[np.flatnonzero(np.diff(light) < 0.0)[0]]

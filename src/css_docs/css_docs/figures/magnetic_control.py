@@ -7,8 +7,8 @@ from css_analysis.figure_style import BLUE, ORANGE, new_figure
 from css_docs.figures._flights import DEG, finish, fly
 
 CAPTION = """\
-`cubesat_3u_safe`: a 3U cubesat from a tip-off at 10 deg/s with three torque rods, a magnetometer and six cells. B-dot takes the rate away within
-an orbit (grey: shadow), the spin then turns the arrays to the Sun."""
+`cubesat_3u_safe`: a 3U cubesat from a tip-off at 10 deg/s with three torque rods, a magnetometer and six cells.
+B-dot takes the rate away within an orbit (grey: shadow), the spin then turns the arrays to the Sun."""
 
 
 def figure() -> Figure:

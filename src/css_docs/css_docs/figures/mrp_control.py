@@ -7,8 +7,8 @@ from css_analysis.figure_style import COLOURS, level_line, new_figure
 from css_docs.figures._flights import DEG, finish, fly
 
 CAPTION = """\
-Angle from array normal to Sun of five cases of `okeefe_2013`, from tumbles of up to 2 deg/s about each axis: wheels saturate in the slew, the
-deadband of 15 deg ends it."""
+Angle from array normal to Sun of five cases of `okeefe_2013`, from tumbles of up to 2 deg/s about each axis: wheels
+saturate in the slew, the deadband of 15 deg ends it."""
 
 
 def figure() -> Figure:
@@ -18,7 +18,7 @@ def figure() -> Figure:
     for case, colour in zip(range(5), COLOURS, strict=False):
         log = fly("okeefe_2013", f"mission.case={case}", "mission.duration=240")
         axes.plot(log.time(log.having("truth")), DEG * log.pointing_error, color=colour, label=f"case {case}")
-    level_line(axes, 30.0, "")
-    level_line(axes, 15.0, "")
+    level_line(axes, 30.0, "power positive")
+    level_line(axes, 15.0, "deadband")
     finish(axes, log, "pointing error [deg]", logarithmically=False)
     return figure

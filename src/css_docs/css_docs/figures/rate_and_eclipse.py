@@ -8,8 +8,8 @@ from css_analysis.figure_style import BLUE, ORANGE, new_figure
 from css_docs.figures._flights import DEG, finish, fly
 
 CAPTION = """\
-Body rate without gyro: what two successive Sun vectors tell, low-passed at 0.1 Hz, and the truth across the Sun line, which is all that
-they can show; the Kalman filter of `okeefe_2013`, case 7."""
+Body rate without gyro: what two successive Sun vectors tell, low-passed at 0.1 Hz, and the truth across the Sun
+line, which is all that they can show; the Kalman filter of `okeefe_2013`, case 7."""
 
 
 def figure() -> Figure:

@@ -13,8 +13,8 @@ from css_sim.fault_effects import FAULT
 from css_sim.nodes.gyro import Gyro
 
 CAPTION = """\
-Allan deviation of a simulated gyro at rest, 0.01 deg/s of white noise a sample and a bias that walks by 2e-4 deg/s a sample, at 10 Hz, beside
-the closed forms of both."""
+Allan deviation of a simulated gyro at rest, 0.01 deg/s of white noise a sample and a bias that walks by 2e-4 deg/s
+a sample, at 10 Hz, beside the closed forms of both."""
 
 _STEPS = 200_000
 _PERIOD = 0.1  # [s]
@@ -22,7 +22,7 @@ _NOISE, _WALK = 0.01, 2e-4  # [deg/s]
 
 
 @outer_kernel
-def _readings(p, errors, faults, key, out):
+def _readings(p, errors, faults, key, out) -> None:
     for k in range(out.shape[0]):
         out[k] = gyro.measure(p, errors, faults, key, k, (0.0, 0.0, 0.0))[0]
 

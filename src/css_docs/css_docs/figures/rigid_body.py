@@ -9,8 +9,9 @@ from css_common.attitude import mrp_to_dcm
 from css_sim.rigid_body import RotationState, propagate, rigid_body
 
 CAPTION = """\
-Torque-free body of `okeefe_2013` with four wheels at 2000 rpm, tumbling at 2 deg/s about each axis: change of kinetic energy of the body with wheels
-held free of torque, and of the angular momentum in n, relative to their size, over ten minutes at 10 Hz."""
+Torque-free body of `okeefe_2013` with four wheels at 2000 rpm, tumbling at 2 deg/s about each axis: change of
+kinetic energy of the body with wheels held free of torque, and of the angular momentum in n, relative to their
+size, over ten minutes at 10 Hz."""
 
 _INERTIA = np.diag([10.5, 8.0, 6.75])
 _AXES = np.sqrt(0.5) * np.array([[0, 1, 1], [0, 1, -1], [1, -1, 0], [-1, -1, 0]])
@@ -33,7 +34,9 @@ def figure() -> Figure:
     figure = new_figure(7.5, 3.0)
     axes = figure.subplots()
     axes.semilogy(time[1:], off[1:], color=COLOURS[0], label="momentum in n")
-    axes.semilogy(time[1:], np.abs(np.array(energies)[1:] / energies[0] - 1.0), color=COLOURS[1], label="energy of the body")
+    axes.semilogy(
+        time[1:], np.abs(np.array(energies)[1:] / energies[0] - 1.0), color=COLOURS[1], label="energy of the body"
+    )
     axes.set_xlabel("time [s]")
     axes.set_ylabel("relative change [-]")
     legend(axes)

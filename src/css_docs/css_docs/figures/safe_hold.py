@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 from css_docs.figures._flights import fly, headings, with_nodes
 
 CAPTION = """\
-`clark_1996_pyramid`: error of the sensed Sun by flat cells and pyramid, which fly, and by the flat cells of the same spacecraft beside
-them. Once the panels face the Sun the pyramid is taken, which the light of the Earth does not reach."""
+`clark_1996_pyramid`: error of the sensed Sun by flat cells and pyramid, which fly, and by the flat cells of the
+same spacecraft beside them. Once the panels face the Sun the pyramid is taken, which the light of the Earth does
+not reach."""
 
 
 def figure() -> Figure:

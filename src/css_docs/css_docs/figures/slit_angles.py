@@ -10,8 +10,8 @@ from css_analysis.figure_style import COLOURS, legend, logarithmic, new_figure
 from css_estimation.spin.slit_angles import quantum
 
 CAPTION = """\
-Sun angle that one count of COUNT stands for, at 6 Hz of spin and three frequencies of the timer. The slits are finest toward 60 deg, where
-they end."""
+Sun angle that one count of COUNT stands for, at 6 Hz of spin and three frequencies of the timer. The slits are
+finest toward 60 deg, where they end."""
 
 _INCLINATION = math.radians(30.0)
 _SPIN_HZ = 6.0

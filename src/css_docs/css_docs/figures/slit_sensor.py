@@ -10,8 +10,8 @@ from css_common.mission import load_mission
 from css_monte_carlo.direct_flight import fly_and_keep
 
 CAPTION = """\
-Two seconds of `esprit_2006` after the booms: Sun angle of the true motion, and what three pulses a turn make of it. Coning moves the axis while
-the Sun goes from slit to slit, so that they miss it by half a degree and more."""
+Two seconds of `esprit_2006` after the booms: Sun angle of the true motion, and what three pulses a turn make of it.
+Coning moves the axis while the Sun goes from slit to slit, so that they miss it by half a degree and more."""
 
 _FROM_S, _TO_S = 78.0, 80.0
 

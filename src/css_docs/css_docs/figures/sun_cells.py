@@ -10,8 +10,8 @@ from css_analysis.figure_style import BLUE, GREY, ORANGE, legend, new_figure
 from css_sim.sun_cells import warped
 
 CAPTION = """\
-Output of a cell against the angle of the Sun from its normal: the cosine, the response of Eq. 16, and what a loss of up to 5 % makes of it.
-The view ends at 60 deg in `okeefe_2013`."""
+Output of a cell against the angle of the Sun from its normal: the cosine, the response of Eq. 16, and what a loss
+of up to 5 % makes of it. The view ends at 60 deg in `okeefe_2013`."""
 
 _HALF_VIEW_DEG = 60.0
 _LARGEST_LOSS = 0.05

@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 from css_docs.figures._flights import fly, headings
 
 CAPTION = """\
-The Sun filter under clouds that it does not know and an Earth half as bright again as the one that it expects, with gyro and by the speeds
-of the wheels alone; `okeefe_sun_filter`, case 3. The steps down are its stages: Sun found, turn about the Sun line found."""
+The Sun filter under clouds that it does not know and an Earth half as bright again as the one that it expects, with
+gyro and by the speeds of the wheels alone; `okeefe_sun_filter`, case 3. The steps down are its stages: Sun found,
+turn about the Sun line found."""
 
 
 def figure() -> Figure:

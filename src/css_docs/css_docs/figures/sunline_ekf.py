@@ -6,8 +6,9 @@ from matplotlib.figure import Figure
 from css_docs.figures._flights import fly, headings, with_nodes
 
 CAPTION = """\
-The same cells through the Kalman filter, which flies, and the weighted average beside it: `okeefe_2013`, case 7, from the tumble
-on. Warp, degradation and the light of the Earth are on the cells; the filter's bound covers them by `cell_sigma`."""
+The same cells through the Kalman filter, which flies, and the weighted average beside it: `okeefe_2013`, case 7,
+from the tumble on. Warp, degradation and the light of the Earth are on the cells; the filter's bound covers them by
+`cell_sigma`."""
 
 
 def figure() -> Figure:

@@ -11,8 +11,8 @@ from css_common.vectors import vector_of
 from css_estimation.attitude.triad import triad, triad_covariance
 
 CAPTION = """\
-Attitude error of TRIAD against the angle between its two directions: root mean square of 400 draws, and the square root of the trace of the
-covariance. Primary 0.1 deg, secondary 0.5 deg about each axis across it."""
+Attitude error of TRIAD against the angle between its two directions: root mean square of 400 draws, and the square
+root of the trace of the covariance. Primary 0.1 deg, secondary 0.5 deg about each axis across it."""
 
 _SIGMAS = (math.radians(0.1), math.radians(0.5))
 _DRAWS = 400

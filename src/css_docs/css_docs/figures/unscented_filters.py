@@ -6,8 +6,8 @@ from matplotlib.figure import Figure
 from css_docs.figures._flights import fly, headings, with_nodes
 
 CAPTION = """\
-Without gyro: the two unscented filters, whose rate is a state, beside the Kalman filter, which flies with the rate of successive Sun
-vectors; `okeefe_2013`, case 7."""
+Without gyro: the two unscented filters, whose rate is a state, beside the Kalman filter, which flies with the rate
+of successive Sun vectors; `okeefe_2013`, case 7."""
 
 
 def figure() -> Figure:

@@ -9,9 +9,9 @@ from css_common.mission import load_mission
 from css_monte_carlo.coverage import grid_of, layout_of_mission, map_cells
 
 CAPTION = """\
-Error of the weighted average against the Sun's angle from the pole of the dual pyramid of O'Keefe & Schaub, ideal cells
-without light of the Earth. The bias, arctan(tan(angle) / 2) off the truth, is there with perfect cells; the jump at 19.5 deg is
-that of two cells that leave their view at once."""
+Error of the weighted average against the Sun's angle from the pole of the dual pyramid of O'Keefe & Schaub, ideal
+cells without light of the Earth. The bias, arctan(tan(angle) / 2) off the truth, is there with perfect cells; the
+jump at 19.5 deg is that of two cells that leave their view at once."""
 
 
 def figure() -> Figure:

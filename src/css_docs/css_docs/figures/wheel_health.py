@@ -7,8 +7,8 @@ from css_analysis.figure_style import COLOURS, new_figure
 from css_docs.figures._flights import DEG, finish, fly
 
 CAPTION = """\
-Wheel 1 is dead from the start: angle to the Sun with the health of the wheels, which leaves it out and shares its part, without it, and of the
-same flight with all wheels; `okeefe_2013`, case 7."""
+Wheel 1 is dead from the start: angle to the Sun with the health of the wheels, which leaves it out and shares its
+part, without it, and of the same flight with all wheels; `okeefe_2013`, case 7."""
 
 
 def figure() -> Figure:

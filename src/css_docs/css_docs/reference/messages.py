@@ -10,7 +10,9 @@ from css_docs.reference.text import contents, plain, table
 from css_docs.staging import REPOSITORY
 
 FOLDER = PurePosixPath("reference", "messages")
-_LINE = re.compile(r"(?P<type>[\w/]+(?:\[[<=\d]*\])?)\s+(?P<name>\w+)\s*(?:=\s*(?P<value>[^#]+?))?\s*(?:#\s*(?P<note>.*))?")
+_LINE = re.compile(
+    r"(?P<type>[\w/]+(?:\[[<=\d]*\])?)\s+(?P<name>\w+)\s*(?:=\s*(?P<value>[^#]+?))?\s*(?:#\s*(?P<note>.*))?"
+)
 _UNIT = re.compile(r"\[(?P<unit>[^\]]+)\]\s*(?P<rest>.*)")
 
 

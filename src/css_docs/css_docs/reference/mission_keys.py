@@ -42,20 +42,22 @@ def _keys(root: Path) -> str:
         if kind.parameters
     ]
     parts.append(f"## Sections of nodes\n\n{table(('node', 'parameters'), lines)}")
+    keys, actions = ", ".join(sorted(EVENT_KEYS)), ", ".join(f"`{action}`" for action in ACTIONS)
     parts.append(
-        f"## events\n\nScripted changes: `events: {{NAME: {{{', '.join(sorted(EVENT_KEYS))}}}}}`. `time` [s] counts from "
-        f"`mission.epoch`, `node` is one of the graph, `action` one of {', '.join(f'`{a}`' for a in ACTIONS)}; `set` takes "
-        "`parameter` and `value`, of a parameter with a star.\n"
+        f"## events\n\nScripted changes: `events: {{NAME: {{{keys}}}}}`. `time` [s] counts from `mission.epoch`, `node` "
+        f"is one of the graph, `action` one of {actions}; `set` takes `parameter` and `value`, of a parameter with a star.\n"
     )
     kinds = dict.fromkeys(k for kind in components(root).values() for k in kind.fault_kinds)
     rows = "\n".join((*FAULT_HEADER, *(fault_row(kind) for kind in (*kinds, *LINK_KINDS))))
     entry = "\n".join((*HEADER, *(row(p) for p in fault_lines.ENTRY)))
-    parts.append(f"## faults\n\n`faults: {{NAME: {{target, kind, ...}}}}`, with these keys and those of its kind:\n\n{entry}\n")
+    parts.append(
+        f"## faults\n\n`faults: {{NAME: {{target, kind, ...}}}}`, with these keys and those of its kind:\n\n{entry}\n"
+    )
     parts.append(f"As a line of a node's parameter `faults` it is `{fault_lines.FORM}`.\n\n{rows}\n")
     parts.append(f"## dispersions\n\n{paragraphs(dispersions.__doc__)}\n\n{paragraphs(distributions.__doc__)}\n")
     parts.append(
-        f"## criteria\n\n`criteria: {{QUANTITY: {{min, max}}}}`, with any of the [quantities]({QUANTITY_PAGE.name}). They are "
-        "the exit code of a flight, and with `measures.required_share` of a study.\n"
+        f"## criteria\n\n`criteria: {{QUANTITY: {{min, max}}}}`, with any of the [quantities]({QUANTITY_PAGE.name}). "
+        "They are the exit code of a flight, and with `measures.required_share` of a study.\n"
     )
     return "\n".join(parts)
 
@@ -76,7 +78,8 @@ def _missions(root: Path) -> str:
 
 def _remark(lines: list[str]) -> str:
     """The comment at the head of a mission: its text, and the commands in it as code."""
-    text, commands = [], []
+    text: list[str] = []
+    commands: list[str] = []
     for line in lines:
         (commands if line.startswith("  ") else text).append(line.strip())
     return plain("\n".join(text)) + (f"\n\n{code(chr(10).join(commands), 'bash')}" if commands else "")

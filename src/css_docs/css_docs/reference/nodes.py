@@ -61,8 +61,8 @@ def pages(root: Path, algorithms: Mapping[str, list[PurePosixPath]]) -> Iterator
     hidden = contents(listed).replace(":maxdepth", ":hidden:\n:maxdepth")
     yield (
         FOLDER / "index.md",
-        f"# Nodes\n\nEach is a lifecycle node, started by `ros2 run PACKAGE NODE` or named in `graph.nodes` of a mission. "
-        f"Topics are those with the defaults of its parameters; further ones with every flag on are marked.\n\n"
+        f"# Nodes\n\nEach is a lifecycle node, started by `ros2 run PACKAGE NODE` or named in `graph.nodes` of a "
+        f"mission. Topics are those with the defaults of its parameters; those with every flag on are marked.\n\n"
         f"{table(('node', 'what it does'), rows)}\n{hidden}",
     )
 

@@ -9,7 +9,7 @@ _MARKS = re.compile(r"([\\*_\[\]<>$|`])")
 
 
 def plain(text: str) -> str:
-    """A text from the code, all of whose characters are to be read as they are; what stands between backticks is code."""
+    """A text from the code, whose characters are to be read as they are; between backticks they are code."""
     parts = re.split(r"(`[^`]+`)", text)
     return "".join(p.replace("|", r"\|") if p.startswith("`") else _MARKS.sub(r"\\\1", p) for p in parts)
 

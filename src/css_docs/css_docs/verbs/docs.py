@@ -34,16 +34,20 @@ def run(options: argparse.Namespace) -> int:
     if options.check:
         print(f"nothing is wrong with {site.pages} pages ({site.seconds:.0f} s)")
         return 0
-    print(f"site: {site.index} ({site.pages} pages, {site.figures} figures, {site.seconds:.0f} s)")
-    opened = not options.open or webbrowser.open(site.index.as_uri())
+    print(f"site: {site.file} ({site.pages} pages, {site.figures} figures, {site.seconds:.0f} s)")
+    opened = not options.open or webbrowser.open(site.file.as_uri())
     if not opened:
         complain("docs", "no browser could be started; open the page yourself")
     if options.json:
-        told = {"index": str(site.index), "pages": site.pages, "figures": site.figures, "seconds": round(site.seconds, 1)}
+        told = {
+            "index": str(site.file),
+            "pages": site.pages,
+            "figures": site.figures,
+            "seconds": round(site.seconds, 1),
+        }
         print(json.dumps(told))
     return 0 if opened else FAILED
 
 
 def _tell(line: str) -> None:
     print(f"docs: {line}", file=sys.stderr, flush=True)
-
