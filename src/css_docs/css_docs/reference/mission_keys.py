@@ -44,8 +44,9 @@ def _keys(root: Path) -> str:
     parts.append(f"## Sections of nodes\n\n{table(('node', 'parameters'), lines)}")
     keys, actions = ", ".join(sorted(EVENT_KEYS)), ", ".join(f"`{action}`" for action in ACTIONS)
     parts.append(
-        f"## events\n\nScripted changes: `events: {{NAME: {{{keys}}}}}`. `time` [s] counts from `mission.epoch`, `node` "
-        f"is one of the graph, `action` one of {actions}; `set` takes `parameter` and `value`, of a parameter with a star.\n"
+        f"## events\n\nScripted changes: `events: {{NAME: {{{keys}}}}}`. `time` [s] counts from `mission.epoch`, "
+        f"`node` is one of the graph, `action` one of {actions}; `set` takes `parameter` and `value`, of a parameter "
+        "with a star.\n"
     )
     kinds = dict.fromkeys(k for kind in components(root).values() for k in kind.fault_kinds)
     rows = "\n".join((*FAULT_HEADER, *(fault_row(kind) for kind in (*kinds, *LINK_KINDS))))
