@@ -99,3 +99,12 @@ def test_an_output_that_is_not_printed_is_found():
     assert missing("a\n...\nb ... c\n", "a\nx\nb 12 c\n") == []
     assert missing("a\nb\n", "b\na\n") == ["b"]
     assert missing("b ... d\n", "b 12 c\n") == ["b ... d"]
+
+
+def test_speeds_of_the_comparison_are_those_of_the_readme():
+    rows = [line for line in (ROOT / "docs" / "comparison.md").read_text().splitlines() if line.startswith("| with")]
+    assert len(rows) == 2
+    readme = (ROOT / "README.md").read_text().splitlines()
+    for row in rows:
+        cells = [cell.strip() for cell in row.strip("|").split("|")]
+        assert any([c.strip() for c in line.strip("|").split("|")][1:] == cells[1:] for line in readme), row
