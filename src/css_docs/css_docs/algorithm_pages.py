@@ -31,6 +31,7 @@ FOLDER = PurePosixPath("algorithms")
 FLOWN = ("css_sensors", "css_environment", "css_sim", "css_estimation", "sunpoint_control", "css_calibration")
 """Packages whose kernels are algorithms that a page must tell of; those of the others count, draw and search."""
 
+_WIDTH = 88  # of a line of code on a page
 _KEYS = {"modules", "nodes", "figures"}
 
 
@@ -38,6 +39,7 @@ class AlgorithmPage(NamedTuple):
     """What a page says of itself."""
 
     page: PurePosixPath
+    title: str
     patterns: tuple[str, ...]
     nodes: tuple[str, ...]
     figures: tuple[str, ...]
@@ -60,7 +62,8 @@ def _read(file: Path) -> AlgorithmPage:
     if not isinstance(said, dict) or not said.keys() <= _KEYS or not said.get("modules"):
         raise DocsError(f"{file}: expected {', '.join(sorted(_KEYS))} between two lines of --- at its beginning")
     lists = [tuple(said.get(key) or ()) for key in ("modules", "nodes", "figures")]
-    return AlgorithmPage(FOLDER / file.name, *lists)
+    title = next((line.removeprefix("# ") for line in rest.splitlines() if line.startswith("# ")), file.stem)
+    return AlgorithmPage(FOLDER / file.name, title, *lists)
 
 
 def kernel_modules(root: Path) -> list[str]:
@@ -80,12 +83,12 @@ def modules_of(page: AlgorithmPage, modules: Collection[str]) -> list[str]:
     return list(dict.fromkeys(named))
 
 
-def runs(root: Path) -> dict[str, list[PurePosixPath]]:
-    """Pages of algorithms by the node `PACKAGE/NODE` that runs them."""
-    found: dict[str, list[PurePosixPath]] = {}
+def runs(root: Path) -> dict[str, dict[str, PurePosixPath]]:
+    """Pages of algorithms, by their titles, by the node `PACKAGE/NODE` that runs them."""
+    found: dict[str, dict[str, PurePosixPath]] = {}
     for page in algorithm_pages(root):
         for node in page.nodes:
-            found.setdefault(node, []).append(page.page)
+            found.setdefault(node, {})[page.title] = page.page
     return found
 
 
@@ -151,7 +154,13 @@ def _kernels(tree: ast.Module) -> list[ast.FunctionDef]:
 
 def _signature(function: ast.FunctionDef) -> str:
     returns = f" -> {ast.unparse(function.returns)}" if function.returns else ""
-    return f"{function.name}({ast.unparse(function.args)}){returns}"
+    line = f"{function.name}({ast.unparse(function.args)}){returns}"
+    if len(line) <= _WIDTH:
+        return line
+    named, given = function.args.args, [ast.unparse(default) for default in function.args.defaults]
+    defaults = [""] * (len(named) - len(given)) + [f" = {default}" for default in given]
+    arguments = [f"    {ast.unparse(name)}{default}," for name, default in zip(named, defaults, strict=True)]
+    return "\n".join((f"{function.name}(", *arguments, f"){returns}"))
 
 
 def _indented(text: str) -> str:

@@ -104,7 +104,7 @@ def test_pages_of_algorithms_name_what_there_is():
     used: list[str] = []
     for p in algorithm_pages.algorithm_pages(ROOT):
         for pattern in p.patterns:
-            one = algorithm_pages.AlgorithmPage(p.page, (pattern,), (), ())
+            one = algorithm_pages.AlgorithmPage(p.page, p.title, (pattern,), (), ())
             assert algorithm_pages.modules_of(one, modules), (p.page, pattern)
         assert p.figures and set(p.figures) <= set(figures), p.page
         used += p.figures

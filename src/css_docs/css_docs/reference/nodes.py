@@ -42,18 +42,18 @@ def page_of(package: str, name: str) -> PurePosixPath:
     return FOLDER / package / f"{name}.md"
 
 
-def pages(root: Path, algorithms: Mapping[str, list[PurePosixPath]]) -> Iterator[tuple[PurePosixPath, str]]:
+def pages(root: Path, algorithms: Mapping[str, Mapping[str, PurePosixPath]]) -> Iterator[tuple[PurePosixPath, str]]:
     """A page for each node, and one that lists them.
 
     Args:
-        algorithms: pages of algorithms by the name `PACKAGE/NODE` of those who run them.
+        algorithms: pages of algorithms, by their titles, by the name `PACKAGE/NODE` of those who run them.
     """
     kinds = components(root)
     rows, listed = [], []
     for package, name in node_files(root):
         page = page_of(package, name)
         kind = kinds.get((package, name))
-        known = algorithms.get(f"{package}/{name}", [])
+        known = algorithms.get(f"{package}/{name}", {})
         yield page, _component_page(kind, page, known) if kind else _verb_page(package, name, root)
         purpose = _first_line(kind.__doc__) if kind else _verb_summary(package, name, root)
         rows.append((f"[`{package} {name}`]({package}/{name}.md)", plain(purpose)))
@@ -71,12 +71,12 @@ def _first_line(text: str | None) -> str:
     return (text or "").strip().splitlines()[0] if text else ""
 
 
-def _component_page(kind: type[Component], page: PurePosixPath, algorithms: list[PurePosixPath]) -> str:
+def _component_page(kind: type[Component], page: PurePosixPath, algorithms: Mapping[str, PurePosixPath]) -> str:
     package, _, name = kind.__module__.partition(".nodes.")
     source = f"src/{package}/{package}/nodes/{name}.py"
     parts = [f"# {package} {name}\n\n{paragraphs(kind.__doc__)}\n"]
     if algorithms:
-        links = ", ".join(f"[{path.stem}]({relative(page, path)})" for path in algorithms)
+        links = ", ".join(f"[{title}]({relative(page, path)})" for title, path in algorithms.items())
         parts.append(f"Algorithms: {links}.\n")
     parts.append(f"    ros2 run {package} {name} --ros-args --params-file MISSION.yaml\n")
     parts.append(f"## Topics\n\n{_topics(kind, name, page)}")
