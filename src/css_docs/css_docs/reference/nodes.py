@@ -7,7 +7,6 @@ from pathlib import Path, PurePosixPath
 from css_common.component import INERTIAL, Component, Input, Output
 from css_common.mission_file import MissionError
 from css_common.node_files import find_component
-from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
 from css_common.readme_parameters import FAULT_HEADER, HEADER, fault_row, row
 from css_common.schema import Values, default_values
 from css_common.shared_sections import shared_sections
@@ -117,6 +116,12 @@ def _topic(way: str, port: Input | Output, values: Values, page: PurePosixPath, 
 
 
 def _quality() -> str:
+    """Quality of service of all nodes alike; nothing where there is no ROS, which has the words for it."""
+    try:
+        from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
+    except ModuleNotFoundError:
+        return ""
+
     def words(profile: object) -> str:
         policies = [profile.reliability, profile.durability]  # type: ignore[attr-defined]
         return ", ".join(policy.name.lower() for policy in policies)
