@@ -17,7 +17,6 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary, JITCPUCodegen
 from numba.core.environment import lookup_environment
 
-
 _ENVIRONMENT = "_ZN08NumbaEnv"  # how names of the places begin where machine code finds its environment
 
 
@@ -58,7 +57,7 @@ class _Library(JITCodeLibrary):
             for variable in self._final_module.global_variables:
                 environment = lookup_environment(variable.name) if variable.name.startswith(_ENVIRONMENT) else None
                 if environment is not None:
-                    self._codegen.set_env(variable.name, environment)
+                    _set_environment_if_there(self._codegen, variable.name, environment)
             return
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
@@ -79,4 +78,4 @@ def _set_environment_if_there(self: Any, name: str, environment: Any) -> None:
 
 
 JITCPUCodegen._library_class = _Library
-JITCPUCodegen.set_env = _set_environment_if_there
+JITCPUCodegen.set_env = _set_environment_if_there  # type: ignore[method-assign]  # as the module says
