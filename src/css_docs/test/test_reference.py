@@ -2,6 +2,7 @@
 """Whatever there is has its page: verbs, nodes, messages, mission keys, kernels; and pages name nothing that is not."""
 
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 import pytest
 
@@ -47,7 +48,7 @@ def test_every_parameter_stands_on_the_page_of_its_node_or_among_the_mission_key
         own = page(made, "nodes", package, f"{name}.md")
         for parameter in kind.table():
             assert f"| `{parameter.name}`" in (keys if parameter.name in shared else own), (name, parameter.name)
-        ports = [*kind.inputs(name, _values(kind)), *kind.outputs(name, _values(kind))]
+        ports: list[Any] = [*kind.inputs(name, _values(kind)), *kind.outputs(name, _values(kind))]
         for topic in [port.topic for port in ports]:
             assert f"| `{topic}` |" in own
 
