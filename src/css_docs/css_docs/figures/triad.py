@@ -21,7 +21,7 @@ _DRAWS = 400
 def figure() -> Figure:
     """Draws and formula."""
     rng = np.random.default_rng(1)
-    angles = np.radians(np.arange(4.0, 91.0, 4.0))
+    angles = np.radians(np.arange(8.0, 91.0, 4.0))
     drawn, stated = [], []
     for angle in angles:
         w1, w2 = np.array([1.0, 0.0, 0.0]), np.array([math.cos(angle), math.sin(angle), 0.0])
