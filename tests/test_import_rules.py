@@ -21,6 +21,7 @@ FLOORS = (
     {"css_report", "css_viewers"},
     {"css_bringup", "css_calibration", "css_monte_carlo"},
     {"css_papers", "css_design", "css_export"},
+    {"css_docs"},
 )
 # rooms inside css_estimation, and which others each may enter: an attitude filter needs to know the cells, the Sun
 # filter is a Sun estimator and gives an attitude

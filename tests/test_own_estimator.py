@@ -31,7 +31,7 @@ IDEAL = (
 def mission(tmp_path_factory):
     """The guide's mission, with its package on the path."""
     folder = tmp_path_factory.mktemp("guide")
-    algorithm, node = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
+    algorithm, node, *_ = re.findall(r"```python\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
     (text,) = re.findall(r"```yaml\n(.*?)```", GUIDE.read_text(encoding="utf-8"), re.DOTALL)
     nodes = folder / "my_package" / "nodes"
     nodes.mkdir(parents=True)

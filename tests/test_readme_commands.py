@@ -15,13 +15,13 @@ from css_common.command import USAGE
 from css_telemetry.commands import import_csv
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = (*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("src/*/README.md"), *ROOT.glob("b*/README.md"))
+DOCUMENTS = (*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), *ROOT.glob("src/*/README.md"), *ROOT.glob("b*/README.md"))
 
 
 def commands(document):
     """Commands of ./sunpoint with a line of their own in a document: the verb and its arguments, in their order."""
     lines = document.read_text(encoding="utf-8").splitlines()
-    words = [shlex.split(line, comments=True) for line in lines if line.startswith("./sunpoint ")]
+    words = [shlex.split(line.split(" > ")[0], comments=True) for line in lines if line.startswith("./sunpoint ")]
     return [(verb, arguments) for _, verb, *arguments in words]
 
 

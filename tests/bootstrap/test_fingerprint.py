@@ -145,3 +145,14 @@ def test_state_survives_a_round_trip_and_bad_files(tmp_path):
     for text in ("", "{", "[]", '{"install": "i"}', '{"environment": {}, "unknown": 1}'):
         file.write_text(text)
         assert State.load(file) == State()
+
+
+def test_an_extra_is_installed_for_those_alone_who_ask_for_it(project, tmp_path):
+    write(tmp_path / "requirements-docs.lock", "sphinx==1")
+    state = settled(project)
+    assert not find_need(project, "wheels", state, True)
+    assert find_need(project, "wheels", state, False, "docs").extra == "docs"
+    state.extras["docs"] = fingerprint.extra_requirements(project, "docs")
+    assert not find_need(project, "wheels", state, False, "docs")
+    write(tmp_path / "requirements-docs.lock", "sphinx==2")
+    assert find_need(project, "wheels", state, False, "docs").extra == "docs"

@@ -14,6 +14,9 @@ from bootstrap.cli import main
 from bootstrap.project import Project, Refusal
 from bootstrap.verbs import OWN_USAGE, VERBS, help_text, unknown_verb
 from bootstrap.version import version_text
+from css_docs.reference.verbs import help_of
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize("arguments", [[], ["--help"], ["-h"], ["help"]])
@@ -59,7 +62,7 @@ def test_a_sourced_jazzy_is_used_on_any_machine(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     asked = []
 
-    def prepare(_project, ros, base, _with_tests):
+    def prepare(_project, ros, base, *_):
         asked.append((ros, host.system_python(base)))
         raise Refusal("far enough")
 
@@ -79,7 +82,32 @@ def test_verbs_without_executable_explain_themselves(capsys):
     assert {name for name, verb in VERBS.items() if not verb.package} == set(OWN_USAGE)
     for name in OWN_USAGE:
         assert main([name, "--help"]) == 0
-        assert capsys.readouterr().out.startswith(f"Usage: ./sunpoint {name}")
+        told = capsys.readouterr().out
+        assert told.startswith(f"Usage: ./sunpoint {name}")
+        lines = told.splitlines()
+        examples = lines[lines.index("examples:") + 1 : lines.index("exit codes:") - 1]
+        assert examples and all(line.startswith(f"  ./sunpoint {name}") for line in examples)
+        assert lines[lines.index("exit codes:") + 1 :]
+
+
+def test_what_a_verb_alone_needs_is_locked_and_not_asked_for_by_its_help(monkeypatch, capsys):
+    extras = {name: verb.extra for name, verb in VERBS.items() if verb.extra}
+    assert {"docs", "completion"} <= extras.keys()
+    for extra in extras.values():
+        lock = (Path(__file__).parents[2] / f"requirements-{extra}.lock").read_text(encoding="utf-8")
+        assert lock.count("--hash=sha256:") >= lock.count("==") > 0
+    asked: list[Any] = []
+    monkeypatch.setattr(cli, "find_need", lambda *given: noted(asked, given[-1], False))
+    monkeypatch.setattr(cli, "_replace_process", lambda command, env: noted(asked, env.get("PYTHONPATH", ""), 0))
+    assert main(["docs", "--help"]) == 0
+    assert main(["docs"]) == 0
+    assert asked[0] == "" and "extra" not in asked[1]
+    assert asked[2] == "docs" and asked[3].split(":")[0].endswith(".venv/extra/docs")
+
+
+def test_a_verb_that_prints_a_table_prints_json_too():
+    without = {name for name, verb in VERBS.items() if verb.package and "--json" not in help_of(ROOT, name)}
+    assert without == {"recover", "completion"}  # which print none
 
 
 def test_executables_are_names_of_modules():

@@ -67,16 +67,20 @@ def _say(line: str) -> None:
 def _start(project: Project, verb: str, arguments: list[str]) -> int:
     base, foreign = without_foreign_python(without_other_sunpoint(os.environ))
     ros = ros_source(base, project.machine)
-    if ros == NONE and VERBS[verb].ros and not {"-h", "--help"}.intersection(arguments):
+    asks_for_help = bool({"-h", "--help"}.intersection(arguments))
+    if ros == NONE and VERBS[verb].ros and not asks_for_help:
         raise Refusal(
             f"{verb} needs ROS 2 Jazzy, which has no packages for {project.machine} to install; where one is on this "
             f"machine: source /opt/ros/{DISTRIBUTION}/setup.bash"
         )
     state = State.load(project.state_file)
     with_tests = verb in ("test", "lint")
-    if find_need(project, ros, state, with_tests):
-        state = _prepare(project, ros, base, with_tests)
+    extra = "" if asks_for_help else VERBS[verb].extra
+    if find_need(project, ros, state, with_tests, extra):
+        state = _prepare(project, ros, base, with_tests, extra)
     env = compose(base, state.environment)
+    if extra:
+        env["PYTHONPATH"] = os.pathsep.join(filter(None, (str(project.extra(extra)), env.get("PYTHONPATH"))))
     if foreign:
         _say(f"PYTHONPATH is left out but for a sourced ROS: {os.pathsep.join(foreign)}")
     if note := stay_on_this_machine(env):
@@ -97,12 +101,12 @@ def _start(project: Project, verb: str, arguments: list[str]) -> int:
     return _replace_process([str(file), *arguments], {**env, "SUNPOINT_VERB": f"{verb}:{executable}"})
 
 
-def _prepare(project: Project, ros: str, base: dict[str, str], with_tests: bool) -> State:
+def _prepare(project: Project, ros: str, base: dict[str, str], with_tests: bool, extra: str) -> State:
     from bootstrap.progress import Terminated
     from bootstrap.workspace import prepare  # late: a start with nothing to do stays fast
 
     try:
-        return prepare(project, ros, base, with_tests)
+        return prepare(project, ros, base, with_tests, extra)
     except Terminated as stop:
         sys.exit(stop.exit_code)
 

@@ -72,6 +72,11 @@ def test_requirements(project: Project) -> str:
     return _digest([_read(project.root / "requirements-test.lock")])
 
 
+def extra_requirements(project: Project, name: str) -> str:
+    """Fingerprint of what a verb with an extra installs in addition."""
+    return _digest([_read(project.root / f"requirements-{name}.lock")])
+
+
 def package(folder: Path) -> str:
     """Fingerprint of what a package's build reads.
 

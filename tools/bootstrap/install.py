@@ -33,6 +33,7 @@ def install(work: Work) -> None:
         _install_ros2(work)
     state = work.state
     state.install, state.test, state.packages = fingerprint.installation(project, work.ros), "", {}
+    state.extras = {}
     state.environment = toolchain(project, work.ros)
     work.save()
 
@@ -43,6 +44,18 @@ def install_tests(work: Work) -> None:
     with Step("installing the test tools") as step:
         _uv(work, step, lock, work.log("install-tests.log"), "--no-deps")
     work.state.test = fingerprint.test_requirements(work.project)
+    work.save()
+
+
+def install_extra(work: Work, name: str) -> None:
+    """Put what one verb alone needs into a folder of its own, where it is in nobody's way."""
+    folder = work.project.extra(name)
+    if folder.exists():
+        shutil.rmtree(folder)
+    lock = work.project.root / f"requirements-{name}.lock"
+    with Step(f"installing what {name} needs (once)") as step:
+        _uv(work, step, lock, work.log(f"install-{name}.log"), "--no-deps", "--target", folder)
+    work.state.extras[name] = fingerprint.extra_requirements(work.project, name)
     work.save()
 
 

@@ -16,12 +16,13 @@ class Need(NamedTuple):
     tests: bool
     packages: dict[str, str]
     removed: tuple[str, ...]
+    extra: str = ""
 
     def __bool__(self) -> bool:
         return any(self)
 
 
-def find_need(project: Project, ros: str, state: State, with_tests: bool) -> Need:
+def find_need(project: Project, ros: str, state: State, with_tests: bool, extra: str = "") -> Need:
     """What has to be done before a verb can run; `packages` maps what to build to its new fingerprint."""
     install = state.install != fingerprint.installation(project, ros)
     wanted = fingerprint.packages(project)
@@ -35,4 +36,9 @@ def find_need(project: Project, ros: str, state: State, with_tests: bool) -> Nee
             if built.get(name) != value or not (project.install / name).is_dir()
         },
         removed=tuple(sorted(built.keys() - wanted.keys())),
+        extra=extra if extra and (install or _is_new(project, state, extra)) else "",
     )
+
+
+def _is_new(project: Project, state: State, extra: str) -> bool:
+    return state.extras.get(extra) != fingerprint.extra_requirements(project, extra)

@@ -48,6 +48,10 @@ class Project:
     def install(self) -> Path:
         return self.root / "install"
 
+    def extra(self, name: str) -> Path:
+        """Where the packages of requirements-NAME.lock lie, apart from everything else."""
+        return self.venv / "extra" / name
+
     @property
     def logs(self) -> Path:
         return self.root / "log" / "bootstrap"
@@ -78,6 +82,7 @@ class State:
     test: str = ""
     packages: dict[str, str] = field(default_factory=dict)
     environment: Environment = field(default_factory=Environment)
+    extras: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def load(cls, file: Path) -> State:

@@ -17,12 +17,14 @@ class Verb(NamedTuple):
     """One verb; without a package it is done by the bootstrap itself.
 
     `ros`: it puts nodes on topics, or tests those, and is refused where there is no ROS.
+    `extra`: it alone needs what requirements-EXTRA.lock names, installed when it is first asked for.
     """
 
     summary: str
     package: str = ""
     executable: str = ""
     ros: bool = False
+    extra: str = ""
 
 
 VERBS = {
@@ -53,6 +55,10 @@ VERBS = {
     "reproduce": Verb("fly a paper's experiments and set its numbers beside ours", "css_papers", "reproduce"),
     "export": Verb("make C libraries for flight computers of a mission's kernels", "css_export", "export"),
     "slit-analyse": Verb("Sun angle, spin and coning from a file of slit pulses", "css_analysis", "slit_analyse"),
+    "docs": Verb("build the documentation, a site that needs no network", "css_docs", "docs", extra="docs"),
+    "completion": Verb(
+        "print completion of verbs and options for bash or zsh", "css_docs", "completion", extra="completion"
+    ),
     "test": Verb("run the linters and the tests; FILE ...: those alone, -m long: the longest", ros=True),
     "lint": Verb("run ruff and mypy over everything"),
     "shell": Verb("open a shell with ros2, colcon and Python ready; -c COMMAND runs one command"),
@@ -97,21 +103,45 @@ that is sourced before: {verbs}. The others do without."""
 OWN_USAGE = {
     "test": """Usage: ./sunpoint test [PYTEST ARGUMENTS]
 
-Runs pytest with message type checks on; without arguments ruff and mypy too, and fails if any of them does.
+Runs pytest with message type checks on; without arguments ruff and mypy too. All options:
+./sunpoint shell -c 'pytest --help'
+
+examples:
   ./sunpoint test                                  linters and all tests, on two processors (pytest -q -n 2 ...)
+  ./sunpoint test -m long                          those that take longest, which the first leaves out
   ./sunpoint test tests/test_processes.py          these tests alone
   ./sunpoint test src/css_common/test -k attitude  some of those
-All options: ./sunpoint shell -c 'pytest --help'""",
+
+exit codes:
+    0  all passed
+    1  a test or a linter failed
+    2  interrupted; 3, 4 and 5 as pytest has them""",
     "lint": """Usage: ./sunpoint lint
 
-Runs ruff and mypy over everything, and fails if one of them does.""",
+Runs ruff (rules and format) and mypy over everything.
+
+examples:
+  ./sunpoint lint
+
+exit codes:
+    0  nothing to complain of
+    1  one of them complains
+  130  interrupted""",
     "shell": f"""Usage: ./sunpoint shell [--flight NAME|PID | --domain N] [-c COMMAND | BASH ARGUMENTS]
 
 Opens bash with the environment that the verbs run in: ros2, colcon, python and every built package.
-With -c it runs one command and ends with its exit code. Message type checks are on; for timed runs
-switch them off with ROS_PYTHON_CHECK_FIELDS=0.
+With -c it runs one command. Message type checks are on; for timed runs switch them off with
+ROS_PYTHON_CHECK_FIELDS=0.
 
-{JOINING_OPTIONS}""",
+{JOINING_OPTIONS}
+
+examples:
+  ./sunpoint shell
+  ./sunpoint shell -c "ros2 pkg executables css_estimation"
+  ./sunpoint shell --flight okeefe_2013
+
+exit codes:
+  that of the shell or the command; 2 when there is no such flight""",
 }
 """Help of the verbs that have no executable to give it."""
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 
 from bootstrap.build import build
 from bootstrap.environment import NONE
-from bootstrap.install import install, install_tests
+from bootstrap.install import install, install_extra, install_tests
 from bootstrap.layout import lay_out
 from bootstrap.plan import find_need
 from bootstrap.progress import say, stoppable
@@ -19,7 +19,7 @@ from bootstrap.project import Project, Refusal, State
 from bootstrap.work import Work, disk_full
 
 
-def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: bool) -> State:
+def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: bool, extra: str = "") -> State:
     """Install and build what is missing or changed; returns the state of the workspace afterwards.
 
     Raises Refusal with a message for the user when that is not possible.
@@ -29,12 +29,14 @@ def prepare(project: Project, ros: str, base: Mapping[str, str], with_tests: boo
         with stoppable(), _alone(project):
             # Whoever held the lock before may have done everything already.
             state = State.load(project.state_file)
-            need = find_need(project, ros, state, with_tests)
+            need = find_need(project, ros, state, with_tests, extra)
             work = Work(project, ros, base, state)
             if need.install:
                 install(work)
             if need.tests:
                 install_tests(work)
+            if need.extra:
+                install_extra(work, need.extra)
             if need.packages or need.removed:
                 (lay_out if ros == NONE else build)(work, need)
             return state

@@ -8,8 +8,9 @@ from typing import Any
 from css_common.mission_file import MissionError
 from css_common.schema import ParameterError, Table, real, shown, unknown_name
 
-_EVENT_KEYS = {"time", "node", "action", "parameter", "value"}
-_ACTIONS = ("activate", "deactivate", "set")
+EVENT_KEYS = {"time", "node", "action", "parameter", "value"}
+ACTIONS = ("activate", "deactivate", "set")
+"""What an event may do, and the keys that it is written with."""
 
 
 @dataclass(frozen=True)
@@ -43,13 +44,13 @@ def _event(name: str, fields: Mapping[str, Any], tables: Mapping[str, Table], wh
     if not name.isprintable():
         raise MissionError(f"{where}: expected a name of printable characters")
     for key in fields:
-        if key not in _EVENT_KEYS:
-            raise MissionError(f"{where}.{unknown_name(key, _EVENT_KEYS)}")
+        if key not in EVENT_KEYS:
+            raise MissionError(f"{where}.{unknown_name(key, EVENT_KEYS)}")
     time, node, action = fields.get("time"), fields.get("node"), fields.get("action")
     if not isinstance(time, float) or not time >= 0.0 or time == float("inf"):
         raise MissionError(f"{where}.time: {shown(time)} given, expected seconds from the epoch, such as 600.0")
-    if action not in _ACTIONS:
-        raise MissionError(f"{where}.action: {shown(action)} given, expected one of {', '.join(_ACTIONS)}")
+    if action not in ACTIONS:
+        raise MissionError(f"{where}.action: {shown(action)} given, expected one of {', '.join(ACTIONS)}")
     if not isinstance(node, str) or node not in tables:
         raise MissionError(f"{where}.node: {unknown_name(str(node), tables)}")
     event = Event(name, time, node, action, str(fields.get("parameter", "")), fields.get("value"))

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from css_common.command import USAGE, command_parser, complain, guarded, implementation
+from css_common.command import USAGE, CommandParser, command_parser, complain, guarded, implementation
 from css_recording.errors import BagError
 
 _DESCRIPTION = """\
@@ -17,14 +17,19 @@ _EXAMPLES = ("bags/FLIGHT", "bags/FLIGHT -o bags/mended")
 _EXITS = {0: "the recording is complete (now)", 1: "it cannot be recovered", 2: "there is none, or an option is wrong"}
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point; returns the exit code."""
+def _parser() -> CommandParser:
     parser = command_parser("css_recording", "recover", _DESCRIPTION, _EXAMPLES, _EXITS)
     parser.add_argument("recording", type=Path, help="folder of the recording, or its .mcap file")
     parser.add_argument(
         "-o", "--output", metavar="FOLDER",
         help="write the finished recording to this new folder, the torn one stays (default: mend it in place)",
     )  # fmt: skip
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    parser = _parser()
     options = parser.parse_args(arguments)
     if not options.recording.exists():
         complain(parser.prog, f"{options.recording}: there is no such recording")
