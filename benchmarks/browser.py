@@ -115,10 +115,10 @@ class Browser:
             raise BrowserError(json.dumps(result["exceptionDetails"])[:2000])
         return result["result"].get("value")
 
-    def open(self, page: Path) -> None:
-        """Opens a file, and waits until it has loaded."""
+    def open(self, page: Path | str) -> None:
+        """Opens a file or an address, and waits until it has loaded."""
         self.events.clear()
-        self.call("Page.navigate", url=page.absolute().as_uri())
+        self.call("Page.navigate", url=page if isinstance(page, str) else page.absolute().as_uri())
         deadline = time.monotonic() + _PATIENCE_S
         while not any(event.get("method") == "Page.loadEventFired" for event in self.events):
             if time.monotonic() > deadline:

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the strip charts show so far, in bounded memory, for browsers that come late."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+MOST = 6000
+"""Rows that are kept."""
+_BUCKET = 4
+
+
+class History:
+    """Rows of time and values. When there are too many, older ones are thinned to extremes: no peak is lost."""
+
+    def __init__(self, width: int, most: int = MOST) -> None:
+        """Empty.
+
+        Args:
+            width: values in a row.
+            most: rows that are kept.
+        """
+        self._rows = np.empty((most, 1 + width))
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, time_s: float, values: Sequence[float]) -> None:
+        """One row more.
+
+        Args:
+            time_s: later than that of the last row.
+            values: not a number where there is none.
+        """
+        if self._count == len(self._rows):
+            self._thin()
+        self._rows[self._count, 0] = time_s
+        self._rows[self._count, 1:] = values
+        self._count += 1
+
+    def columns(self) -> np.ndarray:
+        """Time and values, (1 + width, count)."""
+        return self._rows[: self._count].T
+
+    def _thin(self) -> None:
+        """The older half: of each few rows the smallest and the largest of every value."""
+        half = len(self._rows) // 2 // _BUCKET * _BUCKET
+        old, recent = self._rows[:half].reshape(-1, _BUCKET, self._rows.shape[1]), self._rows[half : self._count].copy()
+        thinned = np.empty((2 * len(old), self._rows.shape[1]))
+        # fmin and fmax pass over what is not a number, unless there is nothing else
+        thinned[0::2], thinned[1::2] = np.fmin.reduce(old, axis=1), np.fmax.reduce(old, axis=1)
+        thinned[0::2, 0], thinned[1::2, 0] = old[:, 0, 0], old[:, -1, 0]
+        self._count = len(thinned) + len(recent)
+        self._rows[: len(thinned)], self._rows[len(thinned) : self._count] = thinned, recent
