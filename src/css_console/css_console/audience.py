@@ -27,6 +27,11 @@ class Spectator:
         self._answers: deque[str] = deque(maxlen=_ANSWERS)
         self._there = asyncio.Event()
 
+    @property
+    def waiting(self) -> int:
+        """Messages that wait to be sent, besides the one that is under way."""
+        return len(self._latest) + len(self._answers)
+
     def give(self, kind: str, text: str) -> None:
         """Puts a message in the place of the last of its kind."""
         self.replaced += kind in self._latest
@@ -49,14 +54,18 @@ class Spectator:
 
 
 class Audience:
-    """All of them."""
+    """All of them.
+
+    Attributes:
+        spectators: who watches now.
+    """
 
     def __init__(self) -> None:
-        self._spectators: set[Spectator] = set()
+        self.spectators: set[Spectator] = set()
         self._last: dict[str, str] = {}
 
     def __len__(self) -> int:
-        return len(self._spectators)
+        return len(self.spectators)
 
     def enter(self, spectator: Spectator, fresh: Iterable[tuple[str, str]] = ()) -> None:
         """One more, who is given the state as it is.
@@ -67,14 +76,14 @@ class Audience:
         """
         for kind, text in (self._last | dict(fresh)).items():
             spectator.give(kind, text)
-        self._spectators.add(spectator)
+        self.spectators.add(spectator)
 
     def leave(self, spectator: Spectator) -> None:
         """One less."""
-        self._spectators.discard(spectator)
+        self.spectators.discard(spectator)
 
     def show(self, kind: str, text: str) -> None:
         """A message for all, and for those who come later."""
         self._last[kind] = text
-        for spectator in self._spectators:
+        for spectator in self.spectators:
             spectator.give(kind, text)

@@ -106,14 +106,14 @@ def _of(node: str, what: str) -> str:
     return node
 
 
-def _pace_call(node: str, name: str, kind: type) -> Call:
+def _pace_call(node: str, name: str, kind: Any) -> Call:
     def verdict(answer: Any) -> Verdict:
         return getattr(answer, "success", True), getattr(answer, "message", "")
 
     return _call(f"{node}/{name}", kind, kind.Request(), {}, verdict)
 
 
-def _told_call(service: str, kind: type, fields: Mapping[str, Any]) -> Call:
+def _told_call(service: str, kind: Any, fields: Mapping[str, Any]) -> Call:
     """Of a service whose answer says whether, and why not."""
     request = kind.Request()
     for name, value in fields.items():
@@ -123,7 +123,7 @@ def _told_call(service: str, kind: type, fields: Mapping[str, Any]) -> Call:
 
 
 def _seek_calls(node: str, begin_ns: int, time_s: float) -> list[Call]:
-    kind = rosbag2_service("Seek") or Seek
+    kind: Any = rosbag2_service("Seek") or Seek
     request = kind.Request()
     request.time.sec, request.time.nanosec = divmod(begin_ns + round(time_s * 1e9), 1_000_000_000)
     shows = {"time": {"sec": request.time.sec, "nanosec": request.time.nanosec}}

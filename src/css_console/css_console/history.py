@@ -11,14 +11,14 @@ _BUCKET = 4
 
 
 class History:
-    """Rows of time and values. When there are too many, older ones are thinned to extremes: no peak is lost."""
+    """Rows of time and values. When there are too many, they are thinned to their extremes: no peak is lost."""
 
     def __init__(self, width: int, most: int = MOST) -> None:
         """Empty.
 
         Args:
             width: values in a row.
-            most: rows that are kept.
+            most: rows that are kept, a multiple of four.
         """
         self._rows = np.empty((most, 1 + width))
         self._count = 0
@@ -44,12 +44,10 @@ class History:
         return self._rows[: self._count].T
 
     def _thin(self) -> None:
-        """The older half: of each few rows the smallest and the largest of every value."""
-        half = len(self._rows) // 2 // _BUCKET * _BUCKET
-        old, recent = self._rows[:half].reshape(-1, _BUCKET, self._rows.shape[1]), self._rows[half : self._count].copy()
-        thinned = np.empty((2 * len(old), self._rows.shape[1]))
+        """Of each few rows the smallest and the largest of every value: half as many."""
+        old = self._rows.reshape(-1, _BUCKET, self._rows.shape[1])
         # fmin and fmax pass over what is not a number, unless there is nothing else
-        thinned[0::2], thinned[1::2] = np.fmin.reduce(old, axis=1), np.fmax.reduce(old, axis=1)
-        thinned[0::2, 0], thinned[1::2, 0] = old[:, 0, 0], old[:, -1, 0]
-        self._count = len(thinned) + len(recent)
-        self._rows[: len(thinned)], self._rows[len(thinned) : self._count] = thinned, recent
+        low, high = np.fmin.reduce(old, axis=1), np.fmax.reduce(old, axis=1)
+        low[:, 0], high[:, 0] = old[:, 0, 0], old[:, -1, 0]
+        self._count = 2 * len(old)
+        self._rows[0 : self._count : 2], self._rows[1 : self._count : 2] = low, high

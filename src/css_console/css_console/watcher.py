@@ -5,6 +5,7 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,6 +18,7 @@ from rclpy.node import Node
 
 from css_common.epochs import mission_epoch
 from css_common.executor import create_executor
+from css_common.vectors import vector_of
 from css_console.calls import Call, Known, Verdict
 from css_console.frames import Frame, Spacecraft, frame_of
 from css_console.history import History
@@ -176,7 +178,9 @@ class Watcher:
     def _craft(self) -> Spacecraft:
         normal = self.parameter("spacecraft.array_normal")
         known = normal is not None and len(normal) == 3
-        return Spacecraft(tuple(map(float, normal)) if known else None, self.parameter("graph.estimator") or "")
+        return Spacecraft(
+            vector_of(np.array(normal, float)) if known else None, self.parameter("graph.estimator") or ""
+        )
 
     # States of nodes
 
@@ -198,7 +202,7 @@ class Watcher:
             self._watched_states[fresh] = self._node.create_subscription(
                 TransitionEvent,
                 f"{fresh}/transition_event",
-                lambda event, node=fresh: self._note_state(node, event),
+                partial(self._note_state, fresh),
                 10,
             )
             self._ask_state(fresh)

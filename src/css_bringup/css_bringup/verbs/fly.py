@@ -108,7 +108,7 @@ def conclude(
             | dict(further or {})
         )
     if result.interrupted:
-        errors.print("interrupted; the recording up to here is complete")
+        errors.print("interrupted" + ("; the recording up to here is complete" if result.bag is not None else ""))
         return INTERRUPTED
     unwritten = with_page and log is not None and page is None
     return FAILED if result.failure or result.notes or missed or unwritten else 0

@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The memory of the strip charts is bounded and loses no peak."""
+
+import numpy as np
+import pytest
+
+from css_console.history import History
+
+
+def test_what_is_short_is_kept_as_it_is():
+    history = History(2, most=64)
+    for k in range(64):
+        history.add(0.5 * k, [k, -k])
+    assert history.columns().tolist() == [[0.5 * k for k in range(64)], list(range(64)), [-k for k in range(64)]]
+
+
+@pytest.mark.parametrize("count", [65, 1_000, 20_000])
+def test_peaks_survive_and_time_goes_forward(count):
+    rng = np.random.default_rng(1)
+    values = rng.normal(size=(count, 3))
+    peaks = rng.choice(count, 6, replace=False)
+    for column, (low, high) in enumerate(peaks.reshape(3, 2)):
+        values[low, column], values[high, column] = -100.0 - column, 100.0 + column
+    history = History(3, most=64)
+    for k, row in enumerate(values):
+        history.add(float(k), row.tolist())
+        assert len(history) <= 64
+    columns = history.columns()
+    assert np.all(np.diff(columns[0]) > 0.0)
+    assert columns[0, 0] == 0.0 and columns[0, -1] == count - 1
+    assert columns[1:].min(axis=1).tolist() == [-100.0, -101.0, -102.0]
+    assert columns[1:].max(axis=1).tolist() == [100.0, 101.0, 102.0]
+
+
+def test_gaps_stay_gaps_where_nothing_else_is():
+    history = History(1, most=64)
+    for k in range(200):
+        history.add(float(k), [float("nan") if k < 100 else 1.0])
+    columns = history.columns()
+    assert np.isnan(columns[1, columns[0] < 80]).all()
+    assert (columns[1, columns[0] > 120] == 1.0).all()
