@@ -125,6 +125,22 @@ class Browser:
                 raise BrowserError(f"{page}: not loaded after {_PATIENCE_S:g} s")
             self.events.append(self._next("load"))
 
+    def until(self, condition: str, what: str) -> Any:
+        """The value of an expression once it is true, looked at again and again in the page.
+
+        Raises:
+            BrowserError: it does not come to be; names it.
+        """
+        ends = int(1000 * (_PATIENCE_S - 5.0))
+        value = self.evaluate(
+            "new Promise((done) => { const ends = performance.now() + " + str(ends) + "; const look = () => {"
+            f"const value = ({condition}); if (value || performance.now() > ends) done(value);"
+            "else setTimeout(look, 30); }; look(); })"
+        )
+        if not value:
+            raise BrowserError(f"never came to be: {what}")
+        return value
+
     @property
     def complaints(self) -> list[str]:
         """Errors and warnings of the console so far."""

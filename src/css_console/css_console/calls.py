@@ -82,7 +82,7 @@ def calls_of(order: Order, known: Known) -> list[Call]:
         node = _of(known.pace, "holds and paces time")
         return [_set_call(node, "rate", float(fields["rate"]) or math.inf, ParameterType.PARAMETER_DOUBLE)]
     if order.do == "seek":
-        return _seek_calls(_of(known.player, "plays a recording"), known.begin_ns, fields["time"])
+        return [_seek_call(_of(known.player, "plays a recording"), known.begin_ns, fields["time"])]
     if order.do == "set":
         node, name = fields["node"], fields["name"]
         if (node, name) not in known.types:
@@ -122,7 +122,7 @@ def _told_call(service: str, kind: Any, fields: Mapping[str, Any]) -> Call:
     return _call(service, kind, request, fields, lambda answer: (answer.success, answer.message))
 
 
-def _seek_calls(node: str, begin_ns: int, time_s: float) -> list[Call]:
+def _seek_call(node: str, begin_ns: int, time_s: float) -> Call:
     kind: Any = rosbag2_service("Seek") or Seek
     request = kind.Request()
     request.time.sec, request.time.nanosec = divmod(begin_ns + round(time_s * 1e9), 1_000_000_000)
@@ -131,8 +131,7 @@ def _seek_calls(node: str, begin_ns: int, time_s: float) -> list[Call]:
     def verdict(answer: Any) -> Verdict:
         return answer.success, getattr(answer, "message", "")
 
-    # one stamp more: of a playback that is held nothing would be seen of the place
-    return [_call(f"{node}/seek", kind, request, shows, verdict)]
+    return _call(f"{node}/seek", kind, request, shows, verdict)
 
 
 def _call(service: str, kind: type, request: Any, fields: Mapping[str, Any], verdict: Callable[[Any], Verdict]) -> Call:

@@ -46,7 +46,14 @@ class Stage:
         refused: messages of browsers that were no orders.
     """
 
-    def __init__(self, watcher: Watcher, subject: Subject) -> None:
+    def __init__(self, watcher: Watcher, subject: Subject, *, begins: bool = False) -> None:
+        """Nobody watches yet.
+
+        Args:
+            watcher: of the graph.
+            subject: what the page is about.
+            begins: let time go on, which is held at the beginning, when the first browser is there.
+        """
         self.audience = Audience()
         self.refused = 0
         self._watcher, self._subject = watcher, subject
@@ -56,11 +63,15 @@ class Stage:
         self._told_nodes = 0.0
         self._log: deque[dict[str, Any]] = deque(maxlen=_LOG)
         self._waiting = 0
+        self._begins = begins
 
     def look(self) -> None:
         """Looks at the graph once, and shows what has changed."""
         watcher = self._watcher
         fresh = watcher.look()
+        if self._begins and self.audience and watcher.frame is not None and watcher.inventory.pace:
+            self._begins = False
+            watcher.perform(calls_of(order_of('{"do": "resume"}'), watcher.known), lambda verdict: None)
         versions = (watcher.version, watcher.parameters.version)
         if versions != self._versions:
             self._versions = versions

@@ -33,6 +33,8 @@ class ConsoleThread:
         fallback: Mapping[str, Any] | None = None,
         begin_ns: int | None = None,
         failed: Callable[[], object] = lambda: None,
+        *,
+        begins: bool = False,
     ) -> None:
         """Prepares.
 
@@ -44,11 +46,12 @@ class ConsoleThread:
             fallback: parameters of the mission, for a graph whose nodes tell none.
             begin_ns: stamp from which seconds count; None: the epoch that the nodes tell.
             failed: called from the thread when it fails after its start.
+            begins: let time go on, which is held at the beginning, when the first browser is there.
         """
         self.address = ""
         self.failure: BaseException | None = None
         self._subject, self._libraries, self._token, self._port = subject, libraries, token, port
-        self._fallback, self._begin_ns, self._failed = fallback, begin_ns, failed
+        self._fallback, self._begin_ns, self._failed, self._begins = fallback, begin_ns, failed, begins
         self._serves = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._over: asyncio.Event | None = None
@@ -83,7 +86,7 @@ class ConsoleThread:
         self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
         watcher = Watcher(self._fallback, self._begin_ns)
         try:
-            server = Server(Stage(watcher, self._subject), self._libraries, self._token)
+            server = Server(Stage(watcher, self._subject, begins=self._begins), self._libraries, self._token)
             async with server.serving(self._port) as self.address:
                 self._serves.set()
                 await server.look_until(self._over)

@@ -27,7 +27,8 @@ from css_console.parameters import Parameters
 from css_console.requests import Requests
 from css_console.taps import TYPES, Taps
 
-_INVENTORY_EVERY_S = 1.0
+_INVENTORY_EVERY_S = 1.0  # wall time [s] between looks around
+_LOOK_EVERY_S = 0.2  # the same before anything flies
 _CALLBACKS = 24  # in a look; a node of the graph tells its health once a second
 _FACTOR_OVER_S = 2.0
 _LEVELS = {
@@ -64,7 +65,7 @@ class Watcher:
         self._executor.add_node(self._node)
         self._fallback = fallback or {}
         self._begin_ns = begin_ns
-        self._first_ns = 0
+        self._first_ns = self._shown_begin_ns = 0
         self._taps = Taps()
         self._requests = Requests(self._node)
         self.parameters = Parameters(self._node, self._requests.ask)
@@ -98,7 +99,7 @@ class Watcher:
             self._executor.spin_once(timeout_sec=0.0)
         self._requests.look()
         now = time.monotonic()
-        if now - self._looked > _INVENTORY_EVERY_S:
+        if now - self._looked > (_INVENTORY_EVERY_S if self.frame is not None else _LOOK_EVERY_S):
             self._looked = now
             self._look_around()
         if self._taps.take():
@@ -133,8 +134,13 @@ class Watcher:
         if self._stamp_ns < 0:
             self._first_ns = stamp_ns
         self._stamp_ns = stamp_ns
+        begin_ns = self.begin_ns
+        if begin_ns != self._shown_begin_ns:  # nodes have told the epoch: what was shown counted from another instant
+            self._shown_begin_ns = begin_ns
+            self.history = History(len(self._series))
+            self.flights += 1
         samples = self._taps.samples(stamp_ns)
-        frame = frame_of(samples, stamp_ns, self.begin_ns, self._craft())
+        frame = frame_of(samples, stamp_ns, begin_ns, self._craft())
         if frame.series != self._series:
             self._series = frame.series
             self.history = History(len(frame.series))

@@ -76,8 +76,10 @@ class PlaybackPace:
         return max(0.0, (stamp_ns - self._anchor_ns) * 1e-9 / self._rate - (self._now() - self._anchored))
 
     def seek(self, stamp_ns: int) -> None:
-        """Asks the playback to go on from a stamp."""
+        """Asks the playback to go on from a stamp; held, it plays that one alone."""
         self._sought_ns = stamp_ns
+        if self.paused:
+            self.grant_stamp()
 
     @property
     def seeks(self) -> bool:

@@ -235,6 +235,8 @@ class PlayerNode(Node):
                 looked = self._now()
                 self._give_way()
             paced = self._publish_group(stamp_ns, messages)
+            if self.pace.seeks:
+                return
             self.pace.stamp_is_over()
             if paced and self._answers:
                 self._await_answers(stamp_ns)

@@ -28,11 +28,11 @@ export class Body {
     this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 60);
     this.azimuth = -0.9;
     this.height = 0.45;
-    this.distance = 8.2;
+    this.distance = 6.4;
     this.view = "space";
     this.group = new THREE.Group();
     this.sky = new THREE.Group();
-    this.scene.add(this.group, this.sky, new THREE.AmbientLight(0xffffff, 0.55));
+    this.scene.add(this.group, this.sky, new THREE.AmbientLight(0xffffff, 1.1));
     this.light = new THREE.DirectionalLight(0xffffff, 2.4);
     this.scene.add(this.light);
     this.craft = {};

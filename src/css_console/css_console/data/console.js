@@ -20,8 +20,10 @@ $("view").addEventListener("change", () => { body.view = $("view").value; body.s
 
 let series = [];
 line.on("scene", (scene) => {
-  document.title = `${scene.subject.title} · Sunpoint console`;
-  $("title").textContent = scene.subject.title;
+  const { mission, case: number } = scene.craft;
+  const title = scene.subject.kind === "recording" || !mission ? scene.subject.title : `${mission}, case ${number}`;
+  document.title = `${title} · Sunpoint console`;
+  $("title").textContent = title;
   controls.show(scene);
   body.become?.(scene.craft);
   const changed = JSON.stringify(series) !== JSON.stringify(scene.series);
@@ -33,6 +35,8 @@ line.on("scene", (scene) => {
 line.on("history", (told) => charts.begin(told.series, told.columns));
 line.on("nodes", (told) => {
   controls.showNodes(told);
+  const starts = told.nodes.filter((row) => ["configuring", "unconfigured", "activating"].includes(row.state));
+  $("doing").textContent = starts.length ? `getting ready: ${starts.map((row) => row.node).join(", ")} (the first start compiles)` : told.director.message;
   const bad = told.nodes.filter((row) => row.level !== "ok");
   $("health").textContent = told.nodes.length ? (bad.length ? `${bad.length} of ${told.nodes.length} not ok` : "ok") : "–";
   $("health").classList.toggle("bad", bad.length > 0);
@@ -48,7 +52,7 @@ line.on("log", ({ log }) => {
 });
 line.on("frame", (frame) => {
   controls.showPace(frame.pace);
-  $("factor").textContent = frame.factor === null ? (frame.pace.paused ? "held" : "stands still") : `${frame.factor.toPrecision(3)} × real time`;
+  $("factor").textContent = frame.factor === null ? (frame.pace.paused ? "held" : "stands still") : `${frame.factor.toPrecision(3)} ×`;
   const now = frame.now;
   document.documentElement.dataset.frame = frame.number;
   if (!now) return;

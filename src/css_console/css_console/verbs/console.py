@@ -59,7 +59,7 @@ def _is_recording(subject: str) -> bool:
 def _fly(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
     options.mission = options.subject or _FIRST_MISSION
     mission = mission_of(options)
-    wish = Wish(options.mission, tuple(overrides_of(options)), options.paused)
+    wish = Wish(options.mission, tuple(overrides_of(options)), paused=True)  # until the first browser is there
     rate = _RATE_OF_A_FLIGHT if options.rate is None else options.rate
     told = {"title": mission.name, "missions": tuple(known_missions()), "estimators": tuple(estimators())}
 
@@ -84,7 +84,7 @@ def _play(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
         fallback = {} if mission is None else mission.shared
         served = _Served(options, libraries, "recording", told, fallback, begin_ns)
         with StopSignal() as stop, ros_process("player", ()), served:
-            node = PlayerNode(recording, PlaybackOptions(rate=rate, paused=options.paused, stay=True))
+            node = PlayerNode(recording, PlaybackOptions(rate=rate, paused=True, stay=True))
             executor = create_executor()
             executor.add_node(node)
             try:
@@ -127,16 +127,18 @@ class _Served:
         from css_console.stage import Subject  # the server is there now, not before `provide`
         from css_console.thread import ConsoleThread
 
-        self._open = options.open
+        self._open, self._waits = options.open, not (options.paused or options.attach)
         # a signal, because whatever flies in the main thread ends by one
         self._thread = ConsoleThread(
             Subject(kind=kind, **told), libraries, new_token(), options.port, fallback, begin_ns,
-            failed=lambda: os.kill(os.getpid(), signal.SIGTERM),
+            failed=lambda: os.kill(os.getpid(), signal.SIGTERM), begins=not (options.paused or options.attach),
         )  # fmt: skip
 
     def __enter__(self) -> "_Served":
         address = self._thread.__enter__().address
         console.print(f"console: {address}  (Ctrl-C ends it)", soft_wrap=True)
+        if self._waits:
+            console.print("it begins when the page is open")
         if self._open and not webbrowser.open(address):
             errors.print("no browser could be started; open the address by hand")
         return self
