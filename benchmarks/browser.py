@@ -125,21 +125,20 @@ class Browser:
                 raise BrowserError(f"{page}: not loaded after {_PATIENCE_S:g} s")
             self.events.append(self._next("load"))
 
-    def until(self, condition: str, what: str) -> Any:
-        """The value of an expression once it is true, looked at again and again in the page.
+    def until(self, condition: str, what: str) -> None:
+        """Waits for an expression to be true, looked at again and again in the page.
 
         Raises:
             BrowserError: it does not come to be; names it.
         """
         ends = int(1000 * (_PATIENCE_S - 5.0))
-        value = self.evaluate(
+        came = self.evaluate(
             "new Promise((done) => { const ends = performance.now() + " + str(ends) + "; const look = () => {"
-            f"const value = ({condition}); if (value || performance.now() > ends) done(value);"
+            f"const came = Boolean({condition}); if (came || performance.now() > ends) done(came);"
             "else setTimeout(look, 30); }; look(); })"
         )
-        if not value:
+        if not came:
             raise BrowserError(f"never came to be: {what}")
-        return value
 
     @property
     def complaints(self) -> list[str]:

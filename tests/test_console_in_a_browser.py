@@ -2,6 +2,8 @@
 """The console in a real browser, on a real flight and a real recording, driven as people drive it."""
 
 import os
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 
@@ -29,8 +31,8 @@ class Page:
     def __init__(self, browser: Browser) -> None:
         self.browser = browser
 
-    def until(self, condition: str) -> object:
-        return self.browser.until(condition, condition)
+    def until(self, condition: str) -> None:
+        self.browser.until(condition, condition)
 
     def text(self, name: str) -> str:
         return self.browser.evaluate(f"document.getElementById('{name}').textContent")
@@ -117,6 +119,12 @@ def test_a_flight_driven_from_its_page(tmp_path):
         assert set_parameter(page, "/ekf", "gate", "0.25") == "done"
         page.has("log", "ros2 param set /ekf gate 0.25")
 
+        # what the page says that it did, a shell can do
+        gate = browser.evaluate("[...document.querySelectorAll('#log code')].map((c) => c.textContent)"
+                                ".find((c) => c.includes('param set /ekf gate 0.25'))")  # fmt: skip
+        assert shell(gate.replace("0.25", "0.125")) == "Set parameter successful"
+        page.until("document.querySelector('[data-key=\"/ekf gate\"] input').value === '0.125'")
+
         # another case, held at the beginning
         page.press("#toggle")
         held(page)
@@ -136,6 +144,12 @@ def test_a_flight_driven_from_its_page(tmp_path):
         page.has("estimates", "wavg (flies)")
         page.until(f"{ERROR} > 0")
         assert page.complaints() == []
+
+
+def shell(command: str) -> str:
+    """Last line that a command of ROS prints."""
+    done = subprocess.run(shlex.split(command), capture_output=True, text=True, check=True)
+    return done.stdout.strip().splitlines()[-1]
 
 
 def set_parameter(page: Page, node: str, name: str, value: str) -> str:

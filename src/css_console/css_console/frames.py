@@ -97,7 +97,7 @@ def frame_of(samples: Samples, stamp_ns: int, begin_ns: int, craft: Spacecraft) 
             chart.add("rate", f"{axis} true", "deg/s", value)
     _hardware(samples, shown, chart)
     _control(samples, shown)
-    shown["faults"] = [row for topic, sample in _all(samples, Faults) for row in _fault_rows(topic, sample)]
+    shown["faults"] = [line for topic, sample in _all(samples, Faults) for line in _fault_lines(topic, sample)]
     shown["health"] = [row for topic, sample in _all(samples, Health) for row in _health_rows(topic, sample)]
     return Frame(shown, chart.row, tuple(chart.series))
 
@@ -225,16 +225,13 @@ def _control(samples: Samples, shown: dict[str, Any]) -> None:
         }
 
 
-def _fault_rows(topic: str, sample: Sample) -> Iterable[dict[str, Any]]:
+def _fault_lines(topic: str, sample: Sample) -> Iterable[str]:
+    """As missions write them."""
     rows = sample.rows[: len(sample.rows) // 4 * 4].reshape(-1, 4)
     for sort, number, kind, row in zip(sample.sort, sample.unit, sample.kind, rows, strict=False):
-        yield {
-            "node": topic.rpartition("/")[2],
-            "unit": unit_name(int(sort), int(number)),
-            "kind": KIND_WORDS.get(int(kind), f"kind {kind}"),
-            "since_s": float(row[2]),
-            "until_s": float(row[3]) if row[3] >= 0.0 else None,
-        }
+        node, unit = topic.removeprefix("/faults/"), unit_name(int(sort), int(number))
+        until = f" to={row[3]:g}" if row[3] >= 0.0 else ""
+        yield f"{node}: {unit} {KIND_WORDS.get(int(kind), kind)} from={row[2]:g}{until}"
 
 
 def _health_rows(topic: str, sample: Sample) -> Iterable[dict[str, Any]]:

@@ -39,6 +39,20 @@ class History:
         self._rows[self._count, 1:] = values
         self._count += 1
 
+    def rearranged(self, places: Sequence[int | None]) -> "History":
+        """The same rows with other values.
+
+        Args:
+            places: where each value was before; None: it was not.
+        """
+        other = History(len(places), len(self._rows))
+        other._count = self._count
+        other._rows[: self._count, 0] = self._rows[: self._count, 0]
+        for column, place in enumerate(places, 1):
+            values = np.nan if place is None else self._rows[: self._count, 1 + place]
+            other._rows[: self._count, column] = values
+        return other
+
     def columns(self) -> np.ndarray:
         """Time and values, (1 + width, count)."""
         return self._rows[: self._count].T

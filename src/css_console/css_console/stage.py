@@ -125,7 +125,12 @@ class Stage:
 
     def _frame(self) -> str:
         frame, watcher = self._watcher.frame, self._watcher
-        told: dict[str, Any] = {"number": self._frames, "factor": watcher.factor(), "pace": watcher.pace()}
+        told: dict[str, Any] = {
+            "number": self._frames,
+            "factor": watcher.factor(),
+            "pace": watcher.pace(),
+            "faults": watcher.faults(),
+        }
         if frame is not None:
             told |= {"now": frame.shown, "row": [None if value != value else value for value in frame.row]}
         return _message("frame", told)

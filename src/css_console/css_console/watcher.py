@@ -18,6 +18,8 @@ from rclpy.node import Node
 
 from css_common.epochs import mission_epoch
 from css_common.executor import create_executor
+from css_common.fault_lines import FAULTS
+from css_common.link_kinds import LINK_FAULTS
 from css_common.vectors import vector_of
 from css_console.calls import Call, Known, Verdict
 from css_console.frames import Frame, Spacecraft, frame_of
@@ -142,8 +144,10 @@ class Watcher:
         samples = self._taps.samples(stamp_ns)
         frame = frame_of(samples, stamp_ns, begin_ns, self._craft())
         if frame.series != self._series:
+            self.history = self.history.rearranged(
+                [self._series.index(s) if s in self._series else None for s in frame.series]
+            )
             self._series = frame.series
-            self.history = History(len(frame.series))
             self.version += 1
         self.history.add(frame.shown["time"], frame.row)
         self._times.append((now, stamp_ns))
@@ -238,6 +242,17 @@ class Watcher:
         told = self._diagnostics.get(node, {}).get("message", "")
         limited = isinstance(rate, float) and math.isfinite(rate)
         return {"node": node, "paused": told == "paused", "rate": rate if limited else 0.0, "state": told}
+
+    def faults(self) -> list[str]:
+        """Faults as nodes have them in their parameters; of a recording those that it tells."""
+        if not self.inventory.faulty:
+            return [] if self.frame is None else self.frame.shown["faults"]
+        return [
+            f"{node.lstrip('/')}: {line}"
+            for node, values in sorted(self.parameters.values.items())
+            for name in (FAULTS.name, LINK_FAULTS.name)
+            for line in values.get(name, ())
+        ]
 
     def director(self) -> dict[str, Any]:
         """What the node that flies again says of the flight."""

@@ -48,6 +48,9 @@ class Graph:
     def director(self):
         return {"node": "/flight", "message": "flying"}
 
+    def faults(self):
+        return ["css_array: cell.0 dead from=3"]
+
     def parameter(self, name):
         return None
 

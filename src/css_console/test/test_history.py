@@ -39,3 +39,14 @@ def test_gaps_stay_gaps_where_nothing_else_is():
     columns = history.columns()
     assert np.isnan(columns[1, columns[0] < 80]).all()
     assert (columns[1, columns[0] > 120] == 1.0).all()
+
+
+def test_what_was_drawn_stays_when_a_topic_joins():
+    history = History(2, most=64)
+    for k in range(3):
+        history.add(float(k), [10.0 + k, 20.0 + k])
+    history = history.rearranged([1, None, 0])
+    history.add(3.0, [23.0, 33.0, 13.0])
+    times, first, fresh, last = history.columns().tolist()
+    assert (times, first, last) == ([0.0, 1.0, 2.0, 3.0], [20.0, 21.0, 22.0, 23.0], [10.0, 11.0, 12.0, 13.0])
+    assert np.isnan(fresh[:3]).all() and fresh[3] == 33.0

@@ -55,6 +55,7 @@ line.on("frame", (frame) => {
   $("factor").textContent = frame.factor === null ? (frame.pace.paused ? "held" : "stands still") : `${frame.factor.toPrecision(3)} ×`;
   const now = frame.now;
   document.documentElement.dataset.frame = frame.number;
+  list($("faults"), frame.faults);
   if (!now) return;
   charts.add(now.time, frame.row);
   controls.showTime(now.time);
@@ -73,7 +74,6 @@ line.on("frame", (frame) => {
   bars($("cells"), now.cells ?? [], (v) => v, (i) => flies?.lit.includes(i), (i) => flies?.isolated.includes(i), "");
   show($("wheels-box"), $("wheels"), now.wheels_rpm, now.control?.wheels_isolated, "rpm");
   show($("rods-box"), $("rods"), now.rods, now.control?.rods_isolated, "");
-  list($("faults"), now.faults.map((f) => `${f.node}: ${f.unit} ${f.kind} from ${f.since_s.toFixed(1)} s${f.until_s === null ? "" : ` to ${f.until_s.toFixed(1)} s`}`));
   list($("verdicts"), now.health.map((v) => `${v.node}: ${v.unit} ${v.kind}, ${v.evidence}, since ${v.since_s.toFixed(1)} s`));
 });
 

@@ -4,11 +4,12 @@
 const $ = (id) => document.getElementById(id);
 const SPEEDS = [[1, "1 ×"], [10, "10 ×"], [60, "60 ×"], [0, "as fast as it goes"]];
 
+// Choices, and which of them is the present one; what somebody has chosen stays until that changes.
 export function fill(select, names, chosen) {
-  const wanted = JSON.stringify(names);
-  if (select.dataset.names === wanted) return;
+  const wanted = JSON.stringify([names, chosen]);
+  if (select.dataset.told === wanted) return;
   const before = chosen ?? select.value;
-  select.dataset.names = wanted;
+  select.dataset.told = wanted;
   select.replaceChildren(...names.map((name) => new Option(name, name)));
   if (names.includes(before)) select.value = before;
 }
