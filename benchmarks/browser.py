@@ -6,6 +6,7 @@ import json
 import os
 import select
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -165,6 +166,20 @@ class Browser:
 
     def cpu_s(self) -> float:
         """Processor time [s] of the browser and all of its processes so far."""
+        return sum(self._processes().values()) / os.sysconf("SC_CLK_TCK")
+
+    def freeze(self) -> None:
+        """Stops all of its processes, as a debugger or a laptop that sleeps does."""
+        for pid in self._processes():
+            os.kill(pid, signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Lets them go on."""
+        for pid in self._processes():
+            os.kill(pid, signal.SIGCONT)
+
+    def _processes(self) -> dict[int, int]:
+        """Its processes, with their processor time in ticks."""
         parents: dict[int, int] = {}
         ticks: dict[int, int] = {}
         for stat in Path("/proc").glob("[0-9]*/stat"):
@@ -177,7 +192,7 @@ class Browser:
         own = {self._process.pid}
         while new := {pid for pid, parent in parents.items() if parent in own} - own:
             own |= new
-        return sum(ticks.get(pid, 0) for pid in own) / os.sysconf("SC_CLK_TCK")
+        return {pid: ticks[pid] for pid in own if pid in ticks}
 
     def screenshot(self, file: Path, *, whole: bool = False) -> None:
         """What is in view as PNG, or the whole page."""

@@ -24,13 +24,13 @@ class Flight:
         self.bench = bench
         self.voltages = bench.listen("voltages", CssVoltages)
         self.estimates = bench.listen("estimator/sun_estimate", SunEstimate)
-        for node in mission.nodes:
-            if node is not mission.plant:
-                bench.host(node.component, mission, node.name)
+        for partner in mission.nodes:
+            if partner is not mission.plant:
+                bench.host(partner.component, mission, partner.name)
         plant = present(mission.plant)
         node = bench.host(plant.component, mission, plant.name, start=False)
         assert isinstance(node, PlantNode)
-        self.plant = node
+        self.plant: PlantNode = node
         if paused:
             node.pace.pause()
         assert node.start()

@@ -69,7 +69,7 @@ class Stage:
         """Looks at the graph once, and shows what has changed."""
         watcher = self._watcher
         fresh = watcher.look()
-        if self._begins and self.audience and watcher.frame is not None and watcher.inventory.pace:
+        if self._begins and self.audience and self._is_ready:
             self._begins = False
             watcher.perform(calls_of(order_of('{"do": "resume"}'), watcher.known), lambda verdict: None)
         versions = (watcher.version, watcher.parameters.version)
@@ -88,6 +88,12 @@ class Stage:
             self._told_nodes = now
             told = {"nodes": watcher.nodes(), "director": watcher.director(), "browsers": len(self.audience)}
             self.audience.show("nodes", _message("nodes", told))
+
+    @property
+    def _is_ready(self) -> bool:
+        """What is held at the beginning is there: a flight at its epoch, a recording before its first message."""
+        found = self._watcher.inventory
+        return bool(found.pace and found.topics and (self._watcher.frame is not None or found.player))
 
     def welcome(self, spectator: Spectator) -> None:
         """Shows the state as it is to one who comes."""

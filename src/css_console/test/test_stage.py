@@ -108,3 +108,29 @@ def test_a_new_flight_brings_its_own_history(stage):
     graph.fly(0.0, 7.0)
     stage.look()
     assert told(spectator)["history"]["columns"] == [[0.0], [7.0]]
+
+
+def test_what_is_held_at_the_beginning_goes_on_with_the_first_browser(made_up_graph):
+    graph = made_up_graph()
+    stage = Stage(graph, Subject("a mission", "flight"), begins=True)
+    graph.inventory = graph.inventory._replace(topics=(("/truth", "css_msgs/msg/SpacecraftState"),))
+    graph.fly(0.0, 1.0)
+    stage.look()
+    assert graph.performed == []
+    stage.welcome(Spectator())
+    stage.look()
+    stage.welcome(Spectator())
+    stage.look()
+    assert [call.service for calls, _ in graph.performed for call in calls] == ["/dynamics/resume"]
+
+
+def test_a_recording_begins_before_its_first_message(made_up_graph):
+    graph = made_up_graph()
+    graph.inventory = graph.inventory._replace(pace="/player", player="/player", director="")
+    stage = Stage(graph, Subject("a recording", "recording"), begins=True)
+    stage.welcome(Spectator())
+    stage.look()
+    assert graph.performed == []  # its topics are not known yet
+    graph.inventory = graph.inventory._replace(topics=(("/truth", "css_msgs/msg/SpacecraftState"),))
+    stage.look()
+    assert len(graph.performed) == 1

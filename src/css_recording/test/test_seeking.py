@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A playback that goes to another instant: forward, back, held, and from its end."""
 
+from typing import Any
+
 import pytest
+from rclpy.parameter import Parameter
 
 from css_common.codec import stamp_of
 from css_common.qos import RECORDER_SUBSCRIPTION
@@ -32,7 +35,7 @@ class Playing:
         self._client = graph.node("hands").create_client(Seek, "player/seek")
         self._pending = None
         self.answers = []
-        self.player = None
+        self.player: Any = None
 
     def seek(self, stamp_ns):
         """Asks; the answer is appended when it is there."""
@@ -50,7 +53,8 @@ class Playing:
 
     def run(self, *steps):
         """Steps: what to do, which gives a condition to wait for, or None."""
-        waiting, left = [], list(steps)
+        waiting: list[Any] = []
+        left = list(steps)
 
         def listen():
             if waiting and not waiting[0]():
@@ -75,7 +79,7 @@ def test_forward_back_and_from_the_end(flight, tmp_path, graph, heard):
         lambda: lambda: len(heard) == 2,
         lambda: playing.seek(stamps[10]),
         lambda: lambda: len(heard) == 3,
-        lambda: playing.player.set_parameters([_rate(float("inf"))]) and None,
+        lambda: playing.player.set_parameters([Parameter("rate", value=float("inf"))]) and None,
         lambda: lambda: heard[-1] == stamps[-1],
         lambda: playing.seek(stamps[97]),
         lambda: lambda: heard[-4:] == [stamps[-1], *stamps[97:]],
@@ -111,9 +115,3 @@ def test_what_is_not_in_the_recording_is_refused_with_what_is(flight, tmp_path, 
         (False, f"time: {last + 1} ns given, {expected}"),
         (True, ""),
     ]
-
-
-def _rate(rate):
-    from rclpy.parameter import Parameter
-
-    return Parameter("rate", value=rate)
