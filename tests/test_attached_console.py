@@ -14,38 +14,43 @@ from css_bringup.processes import executable_path
 FLY = ("okeefe_2013", "--stay", "--paused", "--no-record")
 
 
-async def told_until(line, condition):
-    """The first message that fulfils a condition."""
-    while True:
-        message = await line.receive(timeout=120.0)
-        assert message.type == aiohttp.WSMsgType.TEXT, message
-        told = json.loads(message.data)
-        if condition(told):
-            return told
+class Line:
+    """What a console tells a browser, the latest of each type."""
 
+    def __init__(self, socket):
+        self.latest = {}
+        self._socket = socket
 
-def at(told, **wanted):
-    return told["type"] == "frame" and "now" in told and all(told["now"].get(k) == v for k, v in wanted.items())
+    async def until(self, kind, condition=lambda told: True):
+        """The latest of a type once it fulfils a condition."""
+        while not (kind in self.latest and condition(self.latest[kind])):
+            message = await self._socket.receive(timeout=120.0)
+            assert message.type == aiohttp.WSMsgType.TEXT, message
+            told = json.loads(message.data)
+            self.latest[told["type"]] = told
+        return self.latest[kind]
+
+    async def order(self, number, **fields):
+        """The answer to an order."""
+        await self._socket.send_str(json.dumps({"id": number, **fields}))
+        return await self.until("answer", lambda told: told["id"] == number)
 
 
 async def drive(address):
-    async with aiohttp.ClientSession() as client, client.ws_connect(address + "socket") as line:
+    async with aiohttp.ClientSession() as client, client.ws_connect(address + "socket") as socket:
+        line = Line(socket)
         # it came after the epoch was published, and sees it all the same
-        first = await told_until(line, lambda told: at(told, time=0.0) and told["now"]["estimates"])
-        assert first["now"]["estimates"][0]["name"] == "ekf"
-        scene = await told_until(line, lambda told: told["type"] == "scene" and told["craft"]["normals"])
-        assert (scene["pace"], scene["director"]) == ("/dynamics", "/flight")
-        assert len(scene["craft"]["normals"]) == 24
-        await line.send_str('{"id": 1, "do": "rate", "rate": 5}')
-        assert (await told_until(line, lambda told: told["type"] == "answer"))["good"]
-        await line.send_str('{"id": 2, "do": "resume"}')
-        assert (await told_until(line, lambda told: told["type"] == "answer"))["good"]
-        frame = await told_until(line, lambda told: at(told) and told["now"]["time"] > 2.0)
+        first = await line.until("frame", lambda told: "now" in told and told["now"]["estimates"])
+        assert (first["now"]["time"], first["now"]["estimates"][0]["name"]) == (0.0, "ekf")
+        scene = await line.until("scene", lambda told: told["craft"]["normals"] and told["director"])
+        assert (scene["pace"], scene["director"], len(scene["craft"]["normals"])) == ("/dynamics", "/flight", 24)
+        assert (await line.order(1, do="rate", rate=5))["good"]
+        assert (await line.order(2, do="resume"))["good"]
+        frame = await line.until("frame", lambda told: told["now"]["time"] > 2.0)
         assert frame["pace"]["rate"] == 5.0
         # errors are those of one instant
         assert 0.0 < frame["now"]["estimates"][0]["error_deg"] < 30.0
-        await line.send_str('{"id": 3, "do": "set", "node": "/ekf", "name": "gate", "value": 7}')
-        refusal = await told_until(line, lambda told: told["type"] == "answer")
+        refusal = await line.order(3, do="set", node="/ekf", name="gate", value=7)
         assert not refusal["good"] and "gate" in refusal["message"]
 
 

@@ -27,12 +27,14 @@ class History:
         return self._count
 
     def add(self, time_s: float, values: Sequence[float]) -> None:
-        """One row more.
+        """One row more, or another one in the place of the last when that is of the same time.
 
         Args:
-            time_s: later than that of the last row.
+            time_s: not before that of the last row.
             values: not a number where there is none.
         """
+        if self._count and self._rows[self._count - 1, 0] == time_s:
+            self._count -= 1
         if self._count == len(self._rows):
             self._thin()
         self._rows[self._count, 0] = time_s

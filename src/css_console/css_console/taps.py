@@ -54,13 +54,14 @@ class Tap:
     Attributes:
         topic: its full name.
         kind: class of its messages.
-        malformed: messages so far that are none.
+        taken: messages so far.
+        malformed: of those the ones that are none.
     """
 
     def __init__(self, node: Node, topic: str, kind: type) -> None:
         """Begins to listen, to what is latched first."""
         self.topic, self.kind = topic, kind
-        self.malformed = 0
+        self.taken = self.malformed = 0
         publishers = node.get_publishers_info_by_topic(topic)
         profile = matching_qos(publishers, KEPT) if publishers else _LATCHED
         self._handle = bare_subscription(node, kind, topic, profile)
@@ -79,6 +80,7 @@ class Tap:
                 taken = self._handle.take_message(self.kind, True)
             if taken is None:
                 break
+            self.taken += 1
             try:
                 stamp_ns = stamp_of(taken[0])
             except DecodeError:
@@ -153,6 +155,11 @@ class Taps:
             if tap not in went_back and tap.stamps and tap.stamps[-1] > newest:
                 tap.forget()
         return True
+
+    @property
+    def taken(self) -> int:
+        """Messages of all topics so far."""
+        return sum(tap.taken for tap in self)
 
     def common_stamp(self) -> int | None:
         """The newest stamp of which truth, cells and estimates are all there; else the newest of any topic.

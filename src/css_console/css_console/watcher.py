@@ -77,6 +77,7 @@ class Watcher:
         self.version = 0
         self.flights = 0
         self._stamp_ns = -1
+        self._taken = 0
         self._series: tuple = ()
         self._looked = -math.inf
         self._times: deque[tuple[float, int]] = deque()
@@ -107,8 +108,10 @@ class Watcher:
         if self._taps.take():
             self._begin_anew()
         stamp_ns = self._taps.common_stamp()
-        if stamp_ns is None or stamp_ns == self._stamp_ns:
+        taken = self._taps.taken
+        if stamp_ns is None or taken == self._taken:
             return False
+        self._taken = taken
         if stamp_ns < self._stamp_ns:
             self._begin_anew()
         self._show(stamp_ns, now)
@@ -135,7 +138,7 @@ class Watcher:
     def _show(self, stamp_ns: int, now: float) -> None:
         if self._stamp_ns < 0:
             self._first_ns = stamp_ns
-        self._stamp_ns = stamp_ns
+        fresh, self._stamp_ns = stamp_ns != self._stamp_ns, stamp_ns
         begin_ns = self.begin_ns
         if begin_ns != self._shown_begin_ns:  # nodes have told the epoch: what was shown counted from another instant
             self._shown_begin_ns = begin_ns
@@ -150,8 +153,9 @@ class Watcher:
             self._series = frame.series
             self.version += 1
         self.history.add(frame.shown["time"], frame.row)
-        self._times.append((now, stamp_ns))
-        while self._times[-1][0] - self._times[0][0] > _FACTOR_OVER_S:
+        if fresh:
+            self._times.append((now, stamp_ns))
+        while self._times and self._times[-1][0] - self._times[0][0] > _FACTOR_OVER_S:
             self._times.popleft()
         self.frame = frame
 

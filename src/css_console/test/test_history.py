@@ -50,3 +50,10 @@ def test_what_was_drawn_stays_when_a_topic_joins():
     times, first, fresh, last = history.columns().tolist()
     assert (times, first, last) == ([0.0, 1.0, 2.0, 3.0], [20.0, 21.0, 22.0, 23.0], [10.0, 11.0, 12.0, 13.0])
     assert np.isnan(fresh[:3]).all() and fresh[3] == 33.0
+
+
+def test_more_that_is_known_of_an_instant_takes_its_place():
+    history = History(1, most=64)
+    for time, value in ((0.0, 1.0), (0.0, 2.0), (1.0, 3.0), (1.0, float("nan")), (1.0, 4.0)):
+        history.add(time, [value])
+    assert history.columns().tolist() == [[0.0, 1.0], [2.0, 4.0]]

@@ -42,7 +42,9 @@ export class Charts {
   add(time, row) {
     if (row.length !== this.series.length) return;
     const times = this.columns[0];
-    if (times.length && time <= times[times.length - 1]) return;
+    const last = times[times.length - 1];
+    if (time < last) return;
+    if (time === last) for (const column of this.columns) column.pop(); // more is known of it now
     times.push(time);
     row.forEach((value, i) => this.columns[i + 1].push(value));
     if (times.length === MOST) this.thin();
