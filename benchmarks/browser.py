@@ -126,20 +126,25 @@ class Browser:
                 raise BrowserError(f"{page}: not loaded after {_PATIENCE_S:g} s")
             self.events.append(self._next("load"))
 
-    def until(self, condition: str, what: str) -> None:
+    def until(self, condition: str, what: str, seconds: float = 270.0) -> None:
         """Waits for an expression to be true, looked at again and again in the page.
+
+        Args:
+            condition: the expression.
+            what: it means, for the message.
+            seconds: wall time after which it is taken for one that never comes; a machine under load takes its time.
 
         Raises:
             BrowserError: it does not come to be; names it.
         """
-        ends = int(1000 * (_PATIENCE_S - 5.0))
-        came = self.evaluate(
-            "new Promise((done) => { const ends = performance.now() + " + str(ends) + "; const look = () => {"
+        ends = time.monotonic() + seconds
+        while not self.evaluate(
+            "new Promise((done) => { const ends = performance.now() + 10000; const look = () => {"
             f"const came = Boolean({condition}); if (came || performance.now() > ends) done(came);"
             "else setTimeout(look, 30); }; look(); })"
-        )
-        if not came:
-            raise BrowserError(f"never came to be: {what}")
+        ):
+            if time.monotonic() > ends:
+                raise BrowserError(f"never came to be: {what}")
 
     @property
     def complaints(self) -> list[str]:
