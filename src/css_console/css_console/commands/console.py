@@ -18,7 +18,7 @@ _EXAMPLES = (
     "bags/reference",
     "--attach",
 )
-_EXITS = {0: "ended from the page or with the last flight", 1: "the last flight, or the page, failed"}
+_EXITS = {0: "ended after a flight that was as it should be", 1: "the last flight, or the console itself, failed"}
 _NOTES = """\
 --attach joins the running flight; --flight NAME|PID or --domain N chooses among several."""
 
@@ -54,7 +54,7 @@ def _parser() -> CommandParser:
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
         help="change one parameter, for instance --set ekf.use_gyro=false; may be repeated",
     )  # fmt: skip
-    add("--rate", type=_rate, metavar="R", help="seconds of flight per second, or inf (default: 20; a recording: 10)")
+    add("--rate", type=_rate, metavar="R", help="seconds of flight per second, or inf (default: 10)")
     add("--paused", action="store_true", help="hold at the beginning")
     add("--record", action="store_true", help="record each flight as `fly` does (default: nothing is recorded)")
     add("--port", type=_port, default=8765, metavar="N", help="port on 127.0.0.1; 0: a free one (default: 8765)")

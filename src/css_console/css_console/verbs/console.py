@@ -32,8 +32,7 @@ from css_recording.player import PlayerNode
 from css_recording.process import ros_process
 
 _FIRST_MISSION = "okeefe_2013"
-_RATE_OF_A_FLIGHT = 10.0
-_RATE_OF_A_RECORDING = 10.0
+_RATE = 10.0
 _LOOK_S = 0.2
 
 
@@ -60,7 +59,7 @@ def _fly(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
     options.mission = options.subject or _FIRST_MISSION
     mission = mission_of(options)
     wish = Wish(options.mission, tuple(overrides_of(options)), paused=True)  # until the first browser is there
-    rate = _RATE_OF_A_FLIGHT if options.rate is None else options.rate
+    rate = _RATE if options.rate is None else options.rate
     told = {"title": mission.name, "missions": tuple(known_missions()), "estimators": tuple(estimators())}
 
     def bag_of(flown: Mission) -> Path | None:
@@ -76,7 +75,7 @@ def _fly(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
 
 def _play(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
     path = Path(options.subject)
-    rate = _RATE_OF_A_RECORDING if options.rate is None else options.rate
+    rate = _RATE if options.rate is None else options.rate
     with BagReader(path) as recording, own_domain(path.name, options.domain, path, console):
         mission = _mission_of(recording)
         begin_ns = recording.start_ns if mission is None else mission.epoch_ns
