@@ -170,8 +170,10 @@ def sides_of(inertia: Any) -> np.ndarray:
     """Sides (3,) [m] of a box whose longest is 1 m and whose moments of inertia have the ratios of a body's.
 
     Args:
-        inertia: (9,) [kg m^2], row-major; its diagonal counts.
+        inertia: (9,) [kg m^2], row-major; its diagonal counts. Empty: not known, and the box is a cube.
     """
+    if not len(inertia):
+        return np.full(3, _LONGEST)
     moments = np.diag(np.asarray(inertia, dtype=np.float64).reshape(3, 3))
     squares = np.maximum(moments.sum() - 2.0 * moments, 1e-4 * moments.sum())
     sides = np.sqrt(squares)

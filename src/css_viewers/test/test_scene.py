@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from listing import MISSIONS
 from scipy.spatial.transform import Rotation
 
 from css_common.codec import Sample, codec_of
@@ -105,6 +106,16 @@ def test_the_cone_of_the_estimate_is_its_three_sigma(scene):
     (text,) = of_group(shapes, "text")
     # a turn by 90 deg about x takes y of the inertial frame to -z of the body: the estimate is opposite
     assert "heading error 180.00 deg" in text.text
+
+
+@pytest.mark.parametrize("name", MISSIONS)
+def test_every_mission_can_be_drawn(name):
+    node = load_mission(name).with_node((PACKAGE, NODE, NODE), {}).node(NODE)
+    scene = Scene(node.values, "bus", "spacecraft")
+    shapes = scene.shapes(truth(), {})
+    assert {shape.group for shape in shapes} >= {"body", "sun", "earth", "text"}
+    assert len(of_group(shapes, "cells")) == len(node.values.cells.normals)
+    assert all(np.isfinite(shape.points).all() and np.isfinite(shape.position).all() for shape in shapes)
 
 
 def test_without_an_estimate_nothing_is_drawn_of_it(scene):
