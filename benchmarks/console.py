@@ -71,6 +71,7 @@ def main() -> int:
             command = [sys.executable, __file__, "--one", way, "--duration", str(options.duration)]
             done = subprocess.run(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent, check=True)
             runs[way].append(json.loads(done.stdout.splitlines()[-1]))
+            print(f"{way}: {done.stdout.splitlines()[-1]}", file=sys.stderr, flush=True)
     print(f"{options.duration:g} s of okeefe_2013, medians of {options.rounds} flights")
     table = {}
     base = {key: median(run[key] for run in runs[ALONE]) for key in ("wall_s", "cpu_s")}
