@@ -3,16 +3,16 @@
 
     ./sunpoint shell -c "python benchmarks/console.py --rounds 5"
 
-Each flight has a process of its own; the ways take turns, so that what else the machine does meets all of them alike.
-Processor time is that of the flight's process, the console in it included, the browser's own not.
+The ways take turns, so that what else the machine does meets all of them alike. Processor time is that of the flight's
+process, the console in it included, the browser's own not.
 """
 
 import argparse
 import contextlib
 import json
 import os
-import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from statistics import median
 
@@ -28,17 +28,16 @@ ALONE, SERVED, WATCHED, FROZEN = "alone", "console", "console and browser", "con
 WAYS = (ALONE, SERVED, WATCHED, FROZEN)
 
 
-def fly(way: str, duration: float) -> dict[str, float]:
+def fly(way: str, duration: float, libraries: Mapping[str, Path]) -> dict[str, float]:
     """One flight: wall and processor time [s] of its loop, and messages that a browser never got."""
     mission = load_mission("okeefe_2013", [f"mission.duration={duration}"])
     with domains.hold_free("flight", "benchmark of the console") as held, contextlib.ExitStack() as stack:
         os.environ["ROS_DOMAIN_ID"] = str(held.domain)
         flight = stack.enter_context(ComposedFlight(mission))
         if way != ALONE:
-            from css_console.stage import Subject
+            from css_console.stage import Subject  # the server is there only now
             from css_console.thread import ConsoleThread
 
-            libraries = provide(print)
             thread = stack.enter_context(ConsoleThread(Subject("benchmark", "flight"), libraries, new_token(), 0))
             if way != SERVED:
                 browser = stack.enter_context(Browser(browser_path() or "", 1400))
@@ -59,19 +58,15 @@ def main() -> int:
     parser.add_argument(
         "--duration", type=float, default=2000.0, metavar="S", help="simulated time [s] (default: 2000)"
     )
-    parser.add_argument("--one", choices=WAYS, help="one flight, its times as JSON")
     parser.add_argument("--json", action="store_true", help="print the medians as one JSON object on the last line")
     options = parser.parse_args()
-    if options.one:
-        print(json.dumps(fly(options.one, options.duration)))
-        return 0
+    libraries = provide(print)
+    fly(ALONE, 10.0, libraries)  # loads what there is to load
     runs: dict[str, list[dict[str, float]]] = {way: [] for way in WAYS}
     for number in range(options.rounds):
         for way in WAYS[number % len(WAYS) :] + WAYS[: number % len(WAYS)]:
-            command = [sys.executable, __file__, "--one", way, "--duration", str(options.duration)]
-            done = subprocess.run(command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parent, check=True)
-            runs[way].append(json.loads(done.stdout.splitlines()[-1]))
-            print(f"{way}: {done.stdout.splitlines()[-1]}", file=sys.stderr, flush=True)
+            runs[way].append(fly(way, options.duration, libraries))
+            print(f"{way}: {runs[way][-1]}", file=sys.stderr, flush=True)
     print(f"{options.duration:g} s of okeefe_2013, medians of {options.rounds} flights")
     table = {}
     base = {key: median(run[key] for run in runs[ALONE]) for key in ("wall_s", "cpu_s")}
