@@ -6,6 +6,7 @@ import json
 import os
 import select
 import shutil
+import signal
 import subprocess
 import tempfile
 import time
@@ -115,15 +116,35 @@ class Browser:
             raise BrowserError(json.dumps(result["exceptionDetails"])[:2000])
         return result["result"].get("value")
 
-    def open(self, page: Path) -> None:
-        """Opens a file, and waits until it has loaded."""
+    def open(self, page: Path | str) -> None:
+        """Opens a file or an address, and waits until it has loaded."""
         self.events.clear()
-        self.call("Page.navigate", url=page.absolute().as_uri())
+        self.call("Page.navigate", url=page if isinstance(page, str) else page.absolute().as_uri())
         deadline = time.monotonic() + _PATIENCE_S
         while not any(event.get("method") == "Page.loadEventFired" for event in self.events):
             if time.monotonic() > deadline:
                 raise BrowserError(f"{page}: not loaded after {_PATIENCE_S:g} s")
             self.events.append(self._next("load"))
+
+    def until(self, condition: str, what: str, seconds: float = 270.0) -> None:
+        """Waits for an expression to be true, looked at again and again in the page.
+
+        Args:
+            condition: the expression.
+            what: it means, for the message.
+            seconds: wall time after which it is taken for one that never comes; a machine under load takes its time.
+
+        Raises:
+            BrowserError: it does not come to be; names it.
+        """
+        ends = time.monotonic() + seconds
+        while not self.evaluate(
+            "new Promise((done) => { const ends = performance.now() + 10000; const look = () => {"
+            f"const came = Boolean({condition}); if (came || performance.now() > ends) done(came);"
+            "else setTimeout(look, 30); }; look(); })"
+        ):
+            if time.monotonic() > ends:
+                raise BrowserError(f"never came to be: {what}")
 
     @property
     def complaints(self) -> list[str]:
@@ -150,6 +171,20 @@ class Browser:
 
     def cpu_s(self) -> float:
         """Processor time [s] of the browser and all of its processes so far."""
+        return sum(self._processes().values()) / os.sysconf("SC_CLK_TCK")
+
+    def freeze(self) -> None:
+        """Stops all of its processes, as a debugger or a laptop that sleeps does."""
+        for pid in self._processes():
+            os.kill(pid, signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Lets them go on."""
+        for pid in self._processes():
+            os.kill(pid, signal.SIGCONT)
+
+    def _processes(self) -> dict[int, int]:
+        """Its processes, with their processor time in ticks."""
         parents: dict[int, int] = {}
         ticks: dict[int, int] = {}
         for stat in Path("/proc").glob("[0-9]*/stat"):
@@ -162,7 +197,7 @@ class Browser:
         own = {self._process.pid}
         while new := {pid for pid, parent in parents.items() if parent in own} - own:
             own |= new
-        return sum(ticks.get(pid, 0) for pid in own) / os.sysconf("SC_CLK_TCK")
+        return {pid: ticks[pid] for pid in own if pid in ticks}
 
     def screenshot(self, file: Path, *, whole: bool = False) -> None:
         """What is in view as PNG, or the whole page."""

@@ -30,14 +30,13 @@ _FIRST_DRAWN = """(async () => {
   return Number(document.documentElement.dataset.drawn ?? performance.now());
 })()"""
 
-_FAULTS = r"""(() => {
+LAYOUT_FAULTS = r"""(() => {
   const faults = [];
   const width = document.documentElement.clientWidth;
   if (document.documentElement.scrollWidth > width + 1)
     faults.push(`the page is ${document.documentElement.scrollWidth} px wide`);
   const shown = (element) => {
-    const style = getComputedStyle(element);
-    return style.visibility !== "hidden" && style.display !== "none" && style.opacity !== "0"
+    return element.checkVisibility({ opacityProperty: true, visibilityProperty: true })
       && !element.closest("script, style, [hidden], thead, .hoverlayer, title");
   };
   const name = (element) => (element.id ? `#${element.id} ` : "") + element.tagName.toLowerCase();
@@ -129,7 +128,7 @@ def look_at(path: str, page: Path, width: int, shots: Path | None = None, *, dar
         )  # fmt: skip
         cpu_s = browser.cpu_s() - before_s
         faults = [f"plot {name} is not drawn" for name in browser.evaluate(_ALL_DRAWN)]
-        faults += browser.evaluate(_FAULTS)
+        faults += browser.evaluate(LAYOUT_FAULTS)
         faults += [f"console: {line}" for line in browser.complaints]
         faults += [f"asks the network for {url}" for url in browser.requests]
         plots = int(browser.evaluate("document.querySelectorAll('figure.plot').length"))

@@ -20,7 +20,7 @@ FLOORS = (
     {"css_analysis"},
     {"css_report", "css_viewers"},
     {"css_bringup", "css_calibration", "css_monte_carlo"},
-    {"css_papers", "css_design", "css_export"},
+    {"css_papers", "css_design", "css_export", "css_console"},
     {"css_docs"},
 )
 # rooms inside css_estimation, and which others each may enter: an attitude filter needs to know the cells, the Sun
@@ -32,7 +32,7 @@ FLOOR_OF = {package: number for number, packages in enumerate(FLOORS) for packag
 PACKAGES = sorted(path.parent.name for path in SOURCES.glob("*/package.xml"))
 ROS = {"rclpy"}
 # the only modules that may know ROS: they put components on it
-ON_ROS = {"css_common", "css_recording", "css_bringup"}
+ON_ROS = {"css_common", "css_recording", "css_bringup", "css_console"}
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:

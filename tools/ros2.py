@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A small `ros2` for environments without ros2cli: `run`, and `pkg list | prefix | executables`.
+"""A small `ros2` for environments without ros2cli: `run`, `pkg`, `service call`, `param get | set`, `lifecycle set`.
 
 It finds packages and executables through the ament index as ros2run and ros2pkg do, with their messages
-and exit codes. It is not ros2cli: topic, node, param, bag, launch and the rest need a full ROS 2 Jazzy
+and exit codes. It is not ros2cli: topic, node, bag, launch and the rest need a full ROS 2 Jazzy
 installation, which Sunpoint uses instead of this file when one is sourced.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib
 import os
 import shlex
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 from ament_index_python import PackageNotFoundError, get_package_prefix, get_packages_with_prefixes
 
-COMMANDS = ("run", "pkg")
+COMMANDS = ("run", "pkg", "service", "param", "lifecycle")
 
 
 def executables(package: str) -> list[Path]:
@@ -65,11 +67,11 @@ def print_prefix(arguments: argparse.Namespace) -> None:
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """The command line of the two commands."""
+    """The command line of all commands."""
     parser = argparse.ArgumentParser(
         prog="ros2", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    commands = parser.add_subparsers(dest="command", required=True, metavar="{run,pkg}")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="{run,pkg,service,param,lifecycle}")
 
     runner = commands.add_parser("run", help="run an executable of a package")
     runner.add_argument("--prefix", help="command to put before the executable, e.g. 'gdb -ex run --args'")
@@ -88,7 +90,43 @@ def make_parser() -> argparse.ArgumentParser:
     prefix.add_argument("package_name")
     prefix.add_argument("--share", action="store_true", help="print its share folder")
     prefix.set_defaults(action=print_prefix)
+    make_calls(commands)
     return parser
+
+
+def make_calls(commands: argparse._SubParsersAction) -> None:
+    """The command line of what is asked of running nodes."""
+    verbs = commands.add_parser("service", help="call a service").add_subparsers(required=True)
+    call = verbs.add_parser("call", help="call a service and print its answer")
+    call.add_argument("service_name", help="for instance /dynamics/pause")
+    call.add_argument("service_type", help="for instance std_srvs/srv/Trigger")
+    call.add_argument("values", nargs="?", default="{}", help="fields of the request in YAML")
+    call.set_defaults(action=later("call_service"))
+
+    verbs = commands.add_parser("param", help="get and set parameters").add_subparsers(required=True)
+    for name, does in (("get", "get_parameter"), ("set", "set_parameter")):
+        one = verbs.add_parser(name, help=f"{name} a parameter of a running node")
+        one.add_argument("node_name", help="for instance /ekf")
+        one.add_argument("parameter_name", help="for instance gate")
+        if name == "set":
+            one.add_argument("value", help="in YAML")
+        one.set_defaults(action=later(does))
+
+    verbs = commands.add_parser("lifecycle", help="take nodes through transitions").add_subparsers(required=True)
+    change = verbs.add_parser("set", help="take a node through a transition")
+    change.add_argument("node_name", help="for instance /gyro")
+    change.add_argument("transition", help="configure, activate, deactivate, cleanup or shutdown")
+    change.set_defaults(action=later("set_lifecycle"))
+
+
+def later(name: str) -> Callable[[argparse.Namespace], str | None]:
+    """A function of `ros2_calls`, which loads ROS: only when it is called."""
+
+    def action(arguments: argparse.Namespace) -> str | None:
+        sys.path.append(str(Path(__file__).parent))
+        return getattr(importlib.import_module("ros2_calls"), name)(arguments)
+
+    return action
 
 
 def main(argv: list[str]) -> int | str | None:

@@ -89,7 +89,7 @@ def _start(project: Project, verb: str, arguments: list[str]) -> int:
         return _lint(project, env)
     if verb == "test":
         return _test(project, arguments, {**env, "ROS_PYTHON_CHECK_FIELDS": "1"})
-    if verb in JOINING and ros != NONE:
+    if (verb in JOINING or "--attach" in arguments) and ros != NONE:
         env, arguments = _join(verb, env, arguments)
     if verb == "shell":
         return _replace_process(_shell(project, arguments), {"ROS_PYTHON_CHECK_FIELDS": "1", **env})

@@ -32,6 +32,7 @@ VERBS = {
         "fly one orbit, record it, replay it through four estimators, draw it", "css_bringup", "demo", ros=True
     ),
     "fly": Verb("fly a mission file, every node on real ROS 2 topics", "css_bringup", "fly", ros=True),
+    "console": Verb("fly a mission or play a bag with a page in the browser", "css_console", "console", ros=True),
     "replay": Verb("step estimators over a recorded bag and compare", "css_bringup", "replay"),
     "hil": Verb(
         "fly a mission in real time with a board in the loop, over serial or UDP", "css_bringup", "hil", ros=True

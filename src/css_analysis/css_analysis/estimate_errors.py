@@ -72,12 +72,18 @@ def _across(e1: Vec3, e2: Vec3, c) -> Vec3:
 
 
 @kernel
+def heading_sigma_of(sun_hat_b: Vec3, covariance) -> float:
+    """One sigma [rad] of one estimate `sun_hat_b` by its covariance (nine, row-major), as `heading_sigmas`."""
+    e1, e2 = axes_across(sun_hat_b)
+    p11, p12, p22 = _across(e1, e2, covariance)
+    middle, half = 0.5 * (p11 + p22), 0.5 * (p11 - p22)
+    return math.sqrt(max(middle + math.sqrt(half * half + p12 * p12), 0.0))
+
+
+@kernel
 def _heading_sigmas_of_rows(sun_hat_b, covariance, sigmas_out) -> None:
     for i in range(sigmas_out.shape[0]):
-        e1, e2 = axes_across(row(sun_hat_b, i))
-        p11, p12, p22 = _across(e1, e2, covariance[i])
-        middle, half = 0.5 * (p11 + p22), 0.5 * (p11 - p22)
-        sigmas_out[i] = math.sqrt(max(middle + math.sqrt(half * half + p12 * p12), 0.0))
+        sigmas_out[i] = heading_sigma_of(row(sun_hat_b, i), covariance[i])
 
 
 def heading_sigmas(log: FlightLog, name: str) -> tuple[np.ndarray, np.ndarray]:

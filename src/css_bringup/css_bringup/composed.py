@@ -3,11 +3,12 @@
 
 import gc
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
 
 from css_bringup.flight_result import FlightResult, Progress, Stopped, as_flown
 from css_bringup.incidents import node_incidents
@@ -38,6 +39,7 @@ class ComposedFlight:
         *,
         overwrite: bool = False,
         stand_ins: Mapping[str, type[Component]] | None = None,
+        guests: Iterable[Callable[[Context], Node]] = (),
     ) -> None:
         """Prepares a flight.
 
@@ -47,6 +49,7 @@ class ComposedFlight:
             executor: kind of executor, see `create_executor`.
             overwrite: replace a recording that is there.
             stand_ins: components in the place of those of some nodes, by name.
+            guests: make further nodes in the context of the flight, which run beside those of the graph.
 
         Raises:
             MissionError: no node of the mission owns simulated time, or it has faults of processes.
@@ -63,6 +66,8 @@ class ComposedFlight:
         self._executor_kind = executor
         self._overwrite = overwrite
         self._stand_ins = stand_ins or {}
+        self._make_guests = guests
+        self._guests: list[Node] = []
 
     def __enter__(self) -> "ComposedFlight":
         self.context.init()
@@ -84,12 +89,15 @@ class ComposedFlight:
                 component, node.name, mission, context=self.context, use_global_arguments=False
             )
             self.executor.add_node(self.nodes[node.name])
+        for make in self._make_guests:
+            self._guests.append(make(self.context))
+            self.executor.add_node(self._guests[-1])
         return self
 
     def __exit__(self, *_: object) -> None:
         if self.recorder is not None:
             self.recorder.close()
-        for node in (*self.nodes.values(), *filter(None, [self.recorder])):
+        for node in (*self._guests, *self.nodes.values(), *filter(None, [self.recorder])):
             retire(self.executor, node)
         self.executor.shutdown()
         self.context.try_shutdown()

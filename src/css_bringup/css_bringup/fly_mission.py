@@ -23,13 +23,13 @@ from css_common.stop_signal import StopSignal
 
 
 @contextmanager
-def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: Console) -> Iterator[int]:
+def own_domain(name: str, asked: str | None, bag: Path | None, console: Console) -> Iterator[int]:
     """A ROS domain that no other flight or test of the machine is in, for all that flies inside the context.
 
     Args:
-        mission: what flies.
+        name: what flies, for others who ask.
         asked: the number after `--domain`, if any.
-        bag: where it is recorded, for others who ask.
+        bag: where it is recorded, likewise.
         console: where the domain is named.
 
     Raises:
@@ -39,15 +39,15 @@ def own_domain(mission: Mission, asked: str | None, bag: Path | None, console: C
     """
     security.check(os.environ)
     recording = str(bag.absolute()) if bag else ""
-    with domains.own(os.environ, mission.name, recording=recording, asked=asked) as held:
-        before = {name: os.environ.pop(name, None) for name in (network.DOMAIN, domains.JOINED)}
+    with domains.own(os.environ, name, recording=recording, asked=asked) as held:
+        before = {variable: os.environ.pop(variable, None) for variable in (network.DOMAIN, domains.JOINED)}
         os.environ[network.DOMAIN] = str(held.domain)
         console.print(f"ROS domain {held.domain}; ./sunpoint shell, record and play join it", soft_wrap=True)
         try:
             yield held.domain
         finally:
             del os.environ[network.DOMAIN]
-            os.environ.update({name: value for name, value in before.items() if value is not None})
+            os.environ.update({variable: value for variable, value in before.items() if value is not None})
 
 
 Ends = Callable[[ComposedFlight], str]
@@ -130,15 +130,16 @@ def _fly_composed(
             reason = reason or ends(flight)
             return stop.came or bool(reason)
 
-        result = _with_progress(mission, flight, console, over)
+        result = with_progress(mission, flight, console, over)
     if reason:
         result.failure, result.interrupted = result.failure or reason, False
     return result
 
 
-def _with_progress(
+def with_progress(
     mission: Mission, flight: ComposedFlight, console: Console, stopped: Callable[[], bool]
 ) -> FlightResult:
+    """Flies to the end or until stopped, with progress on the terminal, or in lines where there is none."""
     total = mission.values.mission.duration
     if not _live(console):
         lines = ProgressLines(f"flying {mission.name}", "s simulated")

@@ -9,18 +9,23 @@ from css_common.drawn_mission import drawn
 from css_common.mission import Mission, load_mission
 
 
+def overrides_of(arguments: argparse.Namespace) -> list[str]:
+    """What the options change in the mission, as KEY=VALUE."""
+    overrides = list(arguments.overrides)
+    for key in ("case", "seed", "duration"):
+        value = getattr(arguments, key)
+        if value is not None:
+            overrides.append(f"mission.{key}={value}")
+    return overrides
+
+
 def mission_of(arguments: argparse.Namespace) -> Mission:
     """The mission that the options describe.
 
     Raises:
         MissionError: it is wrong.
     """
-    overrides = list(arguments.overrides)
-    for key in ("case", "seed", "duration"):
-        value = getattr(arguments, key)
-        if value is not None:
-            overrides.append(f"mission.{key}={value}")
-    mission = load_mission(arguments.mission, overrides)
+    mission = load_mission(arguments.mission, overrides_of(arguments))
     refuse_unknown_criteria(mission)
     for remark in mission.remarks:
         complain("warning:", remark)

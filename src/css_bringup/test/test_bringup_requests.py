@@ -222,7 +222,7 @@ def test_a_recorder_that_died_is_what_a_failed_flight_reports(tmp_path, capfd):
     ("came", "code", "said"),
     [
         ({}, 0, []),
-        ({"interrupted": True}, INTERRUPTED, ["interrupted; the recording up to here is complete"]),
+        ({"interrupted": True}, INTERRUPTED, ["interrupted"]),
         ({"failure": "dynamics died"}, FAILED, ["the flight failed: dynamics died"]),
     ],
 )

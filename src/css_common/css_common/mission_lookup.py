@@ -32,9 +32,13 @@ def find_mission(name: str) -> Path:
             reason = "a mission is a regular file" if os.path.exists(name) else "no such mission file"
             raise MissionError(f"{name if len(name) <= _LONGEST_SHOWN else shown(name)}: {reason}")
         return Path(name)
-    known: list[str] = []
     for folder in mission_folders():
         if os.path.isfile(folder / f"{name}.yaml"):  # False, too, for a name that no file can have
             return folder / f"{name}.yaml"
-        known += [p.stem for p in sorted(folder.glob("*.yaml"))]
-    raise MissionError(f"mission {unknown_name(name, known)} (missions: {', '.join(dict.fromkeys(known)) or 'none'})")
+    known = known_missions()
+    raise MissionError(f"mission {unknown_name(name, known)} (missions: {', '.join(known) or 'none'})")
+
+
+def known_missions() -> list[str]:
+    """Names by which missions are found, those of the nearest folder first."""
+    return list(dict.fromkeys(path.stem for folder in mission_folders() for path in sorted(folder.glob("*.yaml"))))

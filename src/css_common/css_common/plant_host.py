@@ -2,15 +2,18 @@
 """The node that owns simulated time: it starts the loop, waits for its partners and paces it.
 
 Lockstep is event driven: the plant leaves stamp k when every awaited topic has a message stamped k. Timers only watch
-(a partner that is silent is named, and after a limit the flight goes on without it) or, in real time, hold back.
+(a partner that is silent is named, and after a limit the flight goes on without it) or hold back what a rate or a pause
+keeps from coming.
 """
 
 import contextlib
+import math
 import time
 from collections.abc import Collection
 from functools import partial
 
 from builtin_interfaces.msg import Time
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.publisher import Publisher
 from rclpy.timer import Timer
 from rosgraph_msgs.msg import Clock
@@ -21,17 +24,26 @@ from css_common.component import Outgoing, Plant
 from css_common.edge import HISTORY, Edge
 from css_common.host import ComponentNode
 from css_common.link import GAP
+from css_common.pace_controls import PaceControls
+from css_common.plant_pace import PlantPace
 from css_common.qos import PROGRESS_TOPIC, RECORDER
 from css_common.rcl_errors import endpoint
+from css_common.schema import ParameterError
 from css_common.sole_subscription import writers_of
 from css_common.writers import Writer, local_processes, runs
 
 _LEAD = HISTORY // 2  # steps ahead of the recorder: well within what a topic holds for it
+_SLOWEST = 1e6  # wall time [s] of a step at the lowest rate
 _LEASE = 30.0  # wall time [s] after which the middleware has forgotten a process that was killed
 
 
 class PlantNode(ComponentNode):
-    """Hosts a `Plant`."""
+    """Hosts a `Plant`.
+
+    Attributes:
+        pace: how fast simulated time may go; `~/pause`, `~/resume`, `~/play_next_stamp` and the parameter `rate` change
+            it in flight.
+    """
 
     component: Plant
 
@@ -56,6 +68,13 @@ class PlantNode(ComponentNode):
         self._go_on_timer: Timer = None  # type: ignore[assignment]  # exists from configure to clean-up
         self._watch: Timer | None = None
         self._clock_publisher: Publisher | None = None
+        factor = self.canonical["lockstep.realtime_factor"]
+        self.pace = PlantPace(factor or math.inf, self._on_change_of_pace)
+        try:
+            self._controls = PaceControls(self, self.pace)
+        except ValueError as error:
+            self.destroy_node()
+            raise ParameterError(str(error)) from error
 
     @property
     def stamp_ns(self) -> int:
@@ -109,6 +128,7 @@ class PlantNode(ComponentNode):
         self._waiting_since = time.monotonic()
         if self._begun:
             self._go_on_timer.reset()
+            self._on_change_of_pace()
         else:
             self._startup_timer = self.create_timer(0.01, self._try_to_begin, clock=self._steady)
 
@@ -310,7 +330,7 @@ class PlantNode(ComponentNode):
             return
         if self.component.finished:
             self.done = True
-        elif self.component.values.lockstep.realtime_factor == 0.0:
+        elif self.pace.free:
             self._go_to(stamp_ns + self.component.period_ns, outgoing)
         else:
             self._held_back = outgoing
@@ -318,19 +338,45 @@ class PlantNode(ComponentNode):
 
     def _begin_to_pace(self) -> None:
         """Has the wall clock hold time back from the first answer on: until then partners are still starting."""
-        if self._pace_timer is None:
-            factor = self.component.values.lockstep.realtime_factor
-            period = max(self.component.period_ns * 1e-9 / factor, 1e-4)
+        if self.pace.paused:
+            if self.pace.take_granted():
+                self._let_go()
+        elif self._pace_timer is None:
+            period = min(max(self.component.period_ns * 1e-9 / self.pace.rate, 1e-4), _SLOWEST)
             self._pace_timer = self.create_timer(period, self._on_pace, clock=self._steady)
 
     def _on_pace(self) -> None:
-        if not self._is_active or self.done:
+        if self._pace_timer is None or not self._is_active or self.done:
             return
         if self._held_back is not None:
-            outgoing, self._held_back = self._held_back, None
-            self._go_to(self._stamp + self.component.period_ns, outgoing)
+            self._let_go()
         elif self._begun:
             self.counters["deadline_missed"] += 1
+
+    def _let_go(self) -> None:
+        outgoing, self._held_back = self._held_back, None
+        assert outgoing is not None
+        self._go_to(self._stamp + self.component.period_ns, outgoing)
+
+    def _on_change_of_pace(self) -> None:
+        """Holds back, or lets go what is held back, as the pace says now."""
+        if self._pace_timer is not None:
+            self.destroy_timer(self._pace_timer)
+            self._pace_timer = None
+        if self._held_back is None or not self._is_active or self.done:
+            return  # the next step will ask
+        if self.pace.free:
+            self._let_go()
+        else:
+            self._begin_to_pace()
+
+    def _own_state(self) -> tuple[bytes, str]:
+        level, message = super()._own_state()
+        if level != DiagnosticStatus.OK or not self._is_active:
+            return level, message
+        if self.done:
+            return level, self.failed or "the flight has ended"
+        return level, "paused" if self.pace.paused else message
 
     # Partners that fall silent
 

@@ -10,6 +10,7 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.type_support import check_for_type_support
 
 __all__ = ["InvalidHandle", "RCLError", "RCLInvalidROSArgsError", "UnknownROSArgsError"]
 
@@ -36,6 +37,7 @@ def event_of(handler: EventHandler) -> Any:
 
 def bare_subscription(node: Node, message_type: type, topic: str, qos: QoSProfile) -> Any:
     """A subscription of the middleware without rclpy's object around it."""
+    check_for_type_support(message_type)
     with node.handle:
         return rclpy_implementation.Subscription(node.handle, message_type, topic, qos.get_c_qos_profile())
 

@@ -13,9 +13,10 @@ from presence import present
 
 from css_estimation.sun import least_squares, sunline_suekf, wavg
 from css_estimation.sun.cell_layout import cell_layout
+from css_estimation.sun.offered import estimators
 from css_estimation.sun_filter import sun_filter
 from css_papers.best import headings
-from css_papers.best.headings import all_layouts, directions, estimators, over_the_sky, values_of
+from css_papers.best.headings import all_layouts, directions, over_the_sky, values_of
 
 COUNT, CYCLES = 60, 100
 SKY = directions(COUNT)

@@ -25,6 +25,7 @@ class PlaybackOptions:
         topics: only these; None: all.
         paused: begin held.
         loop: begin again at the end, with the same stamps.
+        stay: wait at the end for a place to go to.
         qos: quality of service of topics that are not to have the strongest.
     """
 
@@ -38,6 +39,7 @@ class PlaybackOptions:
     topics: tuple[str, ...] | None = None
     paused: bool = False
     loop: bool = False
+    stay: bool = False
     qos: Mapping[str, QoSProfile] = field(default_factory=dict)
 
 

@@ -30,6 +30,7 @@ class PlaybackPace:
         self._next_ns = 0
         self._messages = 0
         self._whole_stamp = False
+        self._sought_ns: int | None = None
 
     @property
     def rate(self) -> float:
@@ -73,6 +74,22 @@ class PlaybackPace:
         if self._rate == math.inf:
             return 0.0
         return max(0.0, (stamp_ns - self._anchor_ns) * 1e-9 / self._rate - (self._now() - self._anchored))
+
+    def seek(self, stamp_ns: int) -> None:
+        """Asks the playback to go on from a stamp; held, it plays that one alone."""
+        self._sought_ns = stamp_ns
+        if self.paused:
+            self.grant_stamp()
+
+    @property
+    def seeks(self) -> bool:
+        """It is asked to go elsewhere."""
+        return self._sought_ns is not None
+
+    def take_sought(self) -> int | None:
+        """The stamp that it is asked to go on from, which is then obeyed; None without."""
+        sought, self._sought_ns = self._sought_ns, None
+        return sought
 
     def played(self, stamp_ns: int) -> None:
         """A message was played while held."""

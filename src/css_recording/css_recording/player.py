@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from itertools import groupby
 from operator import attrgetter
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
@@ -21,7 +22,9 @@ from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
 
 from css_common.diagnostics import Diagnostics, Health
+from css_common.pace_controls import PaceControls, rosbag2_service
 from css_common.qos import LOOP_PUBLISHER
+from css_msgs.srv import Seek
 from css_recording.bag_reader import BagMessage
 from css_recording.errors import BagError
 from css_recording.lockstep_answers import LockstepAnswers
@@ -29,7 +32,6 @@ from css_recording.merged_bags import Recording
 from css_recording.playback import PlaybackError, PlaybackOptions, PlaybackReport
 from css_recording.playback_choice import choose
 from css_recording.playback_pace import PlaybackPace
-from css_recording.player_controls import PlayerControls
 from css_recording.ros_topics import message_class_of, publishers_of_others
 
 _SETTLED_AFTER = 2.0
@@ -45,7 +47,7 @@ class PlayerNode(Node):
     Attributes:
         report: what has been played.
         pace: when what is due.
-        controls: hold, step, rate.
+        controls: hold, step, rate; `~/seek` goes to an instant.
     """
 
     def __init__(
@@ -77,7 +79,8 @@ class PlayerNode(Node):
         self.pace = PlaybackPace(options.rate, now, paused=options.paused)
         try:
             self._choice = choose(reader, options, self.resolve_topic_name)
-            self.controls = PlayerControls(self, self.pace)
+            self.controls = PaceControls(self, self.pace, self.pace.grant_message)
+            self.create_service(rosbag2_service("Seek") or Seek, "~/seek", self._seek)
         except (BagError, ValueError) as error:
             self.destroy_node()
             raise BagError(str(error)) from error
@@ -95,7 +98,7 @@ class PlayerNode(Node):
         if self.report.not_installed:
             message = f"types not installed: {', '.join(self.report.not_installed)}"
             return Health(DiagnosticStatus.WARN, message, counters, 0)
-        return Health(DiagnosticStatus.OK, "playing", counters, 0)
+        return Health(DiagnosticStatus.OK, "paused" if self.pace.paused else "playing", counters, 0)
 
     def play(
         self,
@@ -204,16 +207,36 @@ class PlayerNode(Node):
     # Playing
 
     def _publish_all(self) -> None:
+        begin_ns: int | None = self._choice.start_ns
+        while begin_ns is not None:
+            self._publish_from(begin_ns)
+            while self._options.stay and not (self._stopped() or self.pace.seeks):
+                self._spin(_SPIN)
+            begin_ns = None if self._stopped() else self.pace.take_sought()
+
+    def _seek(self, request: Any, response: Any) -> Any:
+        stamp_ns = request.time.sec * 1_000_000_000 + request.time.nanosec
+        first_ns, last_ns = self._reader.start_ns, self._reader.end_ns
+        response.success = first_ns <= stamp_ns <= last_ns
+        if response.success:
+            self.pace.seek(stamp_ns)
+        elif hasattr(response, "message"):  # rosbag2's has none
+            response.message = f"time: {stamp_ns} ns given, expected a stamp from {first_ns} to {last_ns} ns"
+        return response
+
+    def _publish_from(self, begin_ns: int) -> None:
         self._answers.forget()
-        self.pace.start(self._choice.start_ns)
+        self.pace.start(begin_ns)
         looked = self._now()
-        for stamp_ns, messages in self._by_stamp():
+        for stamp_ns, messages in self._by_stamp(begin_ns):
             if not self._await_turn(stamp_ns):
                 return
             if self._now() - looked > _LOOK_EVERY:
                 looked = self._now()
                 self._give_way()
             paced = self._publish_group(stamp_ns, messages)
+            if self.pace.seeks:
+                return
             self.pace.stamp_is_over()
             if paced and self._answers:
                 self._await_answers(stamp_ns)
@@ -221,17 +244,17 @@ class PlayerNode(Node):
     def _await_turn(self, stamp_ns: int) -> bool:
         """Waits until the next message, of this stamp, is due; False when the playback is to end instead."""
         self._spin(0.0)  # also when it is late: nodes of this process must get their turn
-        while not self._stopped():
+        while not (self._stopped() or self.pace.seeks):
             wait = self.pace.wait(stamp_ns)
             if wait <= 0.0:
                 return True
             self._spin(min(_SPIN, wait))
         return False
 
-    def _by_stamp(self) -> Iterator[tuple[int, Iterable[BagMessage]]]:
+    def _by_stamp(self, begin_ns: int) -> Iterator[tuple[int, Iterable[BagMessage]]]:
         played = [*self._publishers_by_topic, *([self._choice.pacing] if self._answers else [])]
         choice = self._choice
-        messages = self._reader.messages(set(played), choice.start_ns, choice.end_ns)
+        messages = self._reader.messages(set(played), begin_ns, choice.end_ns)
         return groupby(messages, key=attrgetter("stamp_ns"))
 
     def _publish_group(self, stamp_ns: int, messages: Iterable[BagMessage]) -> bool:
@@ -255,7 +278,7 @@ class PlayerNode(Node):
     def _step(self, stamp_ns: int) -> bool:
         """Waits, held, until one message is granted or all go on; False when the playback is to end instead."""
         due = self._await_turn(stamp_ns)
-        if self.pace.paused:
+        if due and self.pace.paused:
             self.pace.played(stamp_ns)
         return due
 

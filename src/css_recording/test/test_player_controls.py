@@ -16,10 +16,10 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_srvs.srv import Trigger
 
+from css_common import pace_controls
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
 from css_common.testing import DEADLINE
 from css_msgs.msg import CssVoltages, WheelTorqueCommand
-from css_recording import player_controls
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.errors import BagError
@@ -153,14 +153,14 @@ def test_types_of_rosbag2_are_used_where_they_are_installed(flight, tmp_path, gr
     made = {}
     with BagReader(flight.record(tmp_path / "bag", 2)) as reader:
         player = graph.add(PlayerNode(reader, PlaybackOptions(), **graph.options))
-        monkeypatch.setattr(player_controls, "_rosbag2_service", lambda name: name)
+        monkeypatch.setattr(pace_controls, "rosbag2_service", lambda name: name)
         node: Any = SimpleNamespace(
             create_service=lambda kind, name, serve: made.update({name: (kind, serve)}),
             declare_parameter=lambda name, value, _: SimpleNamespace(value=value),
             add_on_set_parameters_callback=lambda _: None,
             set_parameters=player.set_parameters,
         )
-        player_controls.PlayerControls(node, player.pace)
+        pace_controls.PaceControls(node, player.pace, player.pace.grant_message)
     kinds = {name: kind for name, (kind, _) in made.items()}
     assert kinds["~/pause"] == "Pause" and kinds["~/set_rate"] == "SetRate"
     assert made["~/pause"][1](None, Response()) == Response()

@@ -12,6 +12,7 @@ _EXAMPLES = (
     "okeefe_2013 --case 137 --set ekf.use_gyro=false",
     "okeefe_2013 --duration 600 --processes --out bags/mine",
     "my_mission.yaml --realtime 10",
+    "okeefe_2013 --stay --paused --no-record",
 )
 _EXITS = {0: "flown, and all pass criteria of the mission met", 1: "the flight failed or missed a criterion"}
 
@@ -29,6 +30,11 @@ def _parser() -> CommandParser:
         help="fly a library of `export`, or a program that speaks as it does, in the place of a node's compiled "
         "function; may be repeated",
     )  # fmt: skip
+    parser.add_argument(
+        "--stay", action="store_true",
+        help="stay after the end, and fly again when the service /flight/reset asks for it; Ctrl-C ends it",
+    )  # fmt: skip
+    parser.add_argument("--paused", action="store_true", help="hold at the epoch until the plant's service resume")
     parser.add_argument("--no-record", action="store_true", help="fly without a recording and figures of merit")
     add_domain_option(parser)
     add_security_option(parser)
@@ -43,6 +49,11 @@ def main(args: list[str] | None = None) -> int:
     arguments = parser.parse_args(args)
     if arguments.components and arguments.processes:
         parser.error("--component: libraries fly in one process; expected no --processes")
+    if arguments.stay and (arguments.processes or arguments.components or arguments.out):
+        parser.error("--stay: flights one after another in one process, each recorded under a name of its own; "
+                     "expected no --processes, --component or --out")  # fmt: skip
+    if arguments.paused and not arguments.stay:
+        parser.error("--paused: expected --stay with it")
     run = implementation("css_bringup.verbs.fly")
     return guarded(parser.prog, lambda: run(arguments))
 

@@ -36,7 +36,7 @@ def _bench_graph(arguments: argparse.Namespace) -> None:
     # field checks of messages are for tests: they cost a fifth of the loop
     os.environ.pop("ROS_PYTHON_CHECK_FIELDS", None)
     mission = load_mission(arguments.mission, [f"mission.duration={arguments.duration}"])
-    with own_domain(mission, arguments.domain, None, console) as domain:
+    with own_domain(mission.name, arguments.domain, None, console) as domain:
         measured = _measure(mission, arguments.repeats)
     figures = {name: _figures(results) for name, results in measured.items()}
     table = ReadableTable()

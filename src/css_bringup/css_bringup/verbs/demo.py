@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
         f"nodes {', '.join(node.name for node in mission.nodes)}",
         soft_wrap=True,
     )
-    with own_domain(mission, arguments.domain, bag, console) as domain:
+    with own_domain(mission.name, arguments.domain, bag, console) as domain:
         flight = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite)
     flight.domain = domain
     if flight.interrupted:

@@ -10,14 +10,16 @@ from css_analysis.faults_flown import NOTHING_FLOWN, faults_flown
 from css_analysis.flight_log import read_flight
 from css_analysis.spin_flight import read_spinning
 from css_analysis.spin_summary import spin_lines, spin_object
+from css_bringup.flight_director import Wish
 from css_bringup.flight_pages import write_flight_page
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import fly, own_domain
-from css_bringup.mission_asked_for import mission_of
+from css_bringup.mission_asked_for import mission_of, overrides_of
 from css_bringup.options import complain, console, errors
 from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_bringup.stand_ins import stand_ins
+from css_bringup.staying import fly_and_stay
 from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
@@ -32,13 +34,15 @@ def run(arguments: argparse.Namespace) -> int:
     components = stand_ins(mission, arguments.components)
     for text in arguments.components:
         console.print(f"in the place of a compiled function: {text}", soft_wrap=True)
-    bag = None if arguments.no_record else (arguments.out or default_bag(mission))
+    bag = None if arguments.no_record or arguments.stay else (arguments.out or default_bag(mission))
     nodes = [*(node.name for node in mission.nodes), RECORDER]
     enclaves = security.enclaves_of(nodes, arguments.processes)
     with (
         security.enforced(os.environ, arguments.security, enclaves),
-        own_domain(mission, arguments.domain, bag, console) as domain,
+        own_domain(mission.name, arguments.domain, bag, console) as domain,
     ):
+        if arguments.stay:
+            return _stay(arguments, mission, domain)
         result = fly(
             mission,
             bag,
@@ -49,6 +53,15 @@ def run(arguments: argparse.Namespace) -> int:
         )
     result.domain = domain
     return conclude(mission, result, as_json=arguments.json, with_page=arguments.report)
+
+
+def _stay(arguments: argparse.Namespace, mission: Mission, domain: int) -> int:
+    def end(flown: Mission, result: FlightResult) -> int:
+        result.domain = domain
+        return conclude(flown, result, as_json=arguments.json, with_page=arguments.report)
+
+    wish = Wish(arguments.mission, tuple(overrides_of(arguments)), arguments.paused)
+    return fly_and_stay(wish, mission, (lambda _: None) if arguments.no_record else default_bag, console, end)
 
 
 def conclude(
@@ -95,7 +108,7 @@ def conclude(
             | dict(further or {})
         )
     if result.interrupted:
-        errors.print("interrupted; the recording up to here is complete")
+        errors.print("interrupted" + ("; the recording up to here is complete" if result.bag is not None else ""))
         return INTERRUPTED
     unwritten = with_page and log is not None and page is None
     return FAILED if result.failure or result.notes or missed or unwritten else 0

@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
     HilBridge.opened = link
     bag = None if arguments.no_record else (arguments.out or default_bag(mission))
     watch = _Watch(arguments.silence)
-    with own_domain(mission, arguments.domain, bag, console) as domain:
+    with own_domain(mission.name, arguments.domain, bag, console) as domain:
         result = fly(mission, bag, processes=False, console=console, overwrite=arguments.overwrite, ends=watch)
     result.domain = domain
     result.notes += watch.notes()

@@ -7,14 +7,12 @@ own choice of cells, and what the layout cannot show.
 
 import math
 from collections.abc import Mapping
-from importlib import resources
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from css_common.component import Component
 from css_common.kernel import typed_call
-from css_common.mission import MissionError, find_component, load_mission
+from css_common.mission import MissionError, load_mission
 from css_common.vectors import vector_of
 from css_estimation.sun.cell_layout import CellLayout, cell_layout, sees
 from css_estimation.sun.sun_estimator import SunEstimator
@@ -22,7 +20,6 @@ from css_estimation.sun.sun_heading import PREDICTION_SUNLIT, UNAIDED, VALIDITY_
 from css_papers.best.layouts import layouts
 from css_papers.best.scenarios import MISSION
 
-_PACKAGE = "css_estimation"
 _SEED = 1
 _PERIOD = 0.1  # [s]
 AT_REST = UNAIDED._replace(gyro_valid=True, sky=UNAIDED.sky._replace(predicted=PREDICTION_SUNLIT))
@@ -44,14 +41,6 @@ class ErrorsOverTheSky(NamedTuple):
     p95_deg: float | None
     worst_deg: float | None
     not_valid: float  # share of the directions
-
-
-def estimators() -> dict[str, type[SunEstimator]]:
-    """All Sun estimators by the name of their node file, found by listing."""
-    files = sorted(file.name for file in (resources.files(_PACKAGE) / "nodes").iterdir())
-    names = [name.removesuffix(".py") for name in files if name.endswith(".py") and not name.startswith("_")]
-    found: dict[str, type[Component]] = {name: find_component(_PACKAGE, name) for name in names}
-    return {name: kind for name, kind in found.items() if issubclass(kind, SunEstimator)}
 
 
 def all_layouts() -> dict[str, Mapping[str, str]]:

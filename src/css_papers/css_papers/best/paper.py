@@ -7,9 +7,10 @@ import numpy as np
 import pyarrow as pa
 
 from css_common.mission import load_mission
+from css_estimation.sun.offered import estimators
 from css_monte_carlo.study import run_study
 from css_papers.best.calibration import calibration_section
-from css_papers.best.headings import ErrorsOverTheSky, all_layouts, directions, estimators, headings, over_the_sky
+from css_papers.best.headings import ErrorsOverTheSky, all_layouts, directions, headings, over_the_sky
 from css_papers.best.scenarios import FILTER, Scenario, scenarios
 from css_papers.best.three_axes import three_axes
 from css_papers.page import Listing, Page, Section, Table, write_page

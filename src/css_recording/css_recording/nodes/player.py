@@ -17,8 +17,9 @@ With --wait-for the playback is in lockstep: the next stamp follows when all the
 
 _NOTES = """\
 keys, on a terminal: SPACE hold or go on; RIGHT next message, S next stamp, while held; UP and DOWN rate +10 and -10 %.
-services: ~/pause ~/resume ~/toggle_paused ~/is_paused ~/play_next ~/play_next_stamp ~/get_rate, of the types of
-  rosbag2_interfaces where that is installed, then also ~/set_rate; else std_srvs/srv/Trigger, whose text answers.
+services: ~/pause ~/resume ~/toggle_paused ~/is_paused ~/play_next ~/play_next_stamp ~/get_rate ~/seek, of the types of
+  rosbag2_interfaces where that is installed, then also ~/set_rate; else std_srvs/srv/Trigger, whose text answers, and
+  css_msgs/srv/Seek.
 parameter: rate, at any time: ros2 param set /player rate 2.0
   The node is /player; --ros-args -r __node:=rosbag2_player gives the services the full names that rosbag2 has."""
 
@@ -67,6 +68,7 @@ def _parser() -> CommandParser:
     add("--topic", action="append", default=[], help="play this topic only; may be repeated (default: all)")
     add("--remap", metavar="OLD:=NEW", type=_renaming, action="append", default=[], help="rename a recorded topic")
     add("--loop", action="store_true", help="begin again at the end, with the same stamps")
+    add("--stay", action="store_true", help="wait at the end until ~/seek goes elsewhere, or Ctrl-C")
     add("--clock", action="store_true", help="publish the recorded time on /clock")
     add("--wait-for", metavar="TOPIC", action="append", default=[], help="lockstep with this topic; may be repeated")
     add("--pace", metavar="TOPIC", help="answers are due to stamps of this topic (default: busiest)")

@@ -51,6 +51,7 @@ def _playback(options: argparse.Namespace) -> PlaybackOptions:
         topics=tuple(options.topic) or None,
         paused=options.start_paused,
         loop=options.loop,
+        stay=options.stay,
         qos=read_qos_overrides(options.qos_profile_overrides_path),
     )
 

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Flights one after another in one process and one ROS domain: each begins when `/flight/reset` asks for it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from rclpy.context import Context
+from rclpy.parameter import Parameter
+from rich.console import Console
+
+from css_bringup.composed import ComposedFlight
+from css_bringup.flight_director import FlightDirector, Wish
+from css_bringup.flight_result import FlightResult
+from css_bringup.fly_mission import with_progress
+from css_bringup.report import print_incidents
+from css_common.drawn_mission import drawn
+from css_common.executor import spin_until
+from css_common.mission import Mission, load_mission
+from css_common.preflight import preflight, report
+from css_common.stop_signal import StopSignal
+
+
+def mission_of_wish(wish: Wish) -> Mission:
+    """The mission that a wish means, checked as before a flight.
+
+    Raises:
+        MissionError: it is wrong, or cannot fly.
+    """
+    mission = drawn(load_mission(wish.mission, wish.overrides)).mission
+    preflight(mission)
+    return mission
+
+
+def fly_and_stay(
+    wish: Wish,
+    mission: Mission,
+    bag_of: Callable[[Mission], Path | None],
+    console: Console,
+    conclude: Callable[[Mission, FlightResult], int],
+    rate: float | None = None,
+) -> int:
+    """Flies, and flies again when asked, until Ctrl-C or SIGTERM; the exit code of the last flight.
+
+    Args:
+        wish: what flies first.
+        mission: the same.
+        bag_of: where a flight is recorded; None: nowhere.
+        console: where progress is shown, when it is a terminal.
+        conclude: says what came of a flight that was not ended for another one, and gives its exit code.
+        rate: simulated seconds per second of the wall clock at first, a later flight has that of the one before it;
+            None: as the mission says.
+
+    Raises:
+        MissionError: a check before the first flight refuses its mission.
+    """
+    with StopSignal() as stop:
+        asked: tuple[Wish, Mission] | None = (wish, mission)
+        code = 0
+        while asked is not None:
+            code, asked, rate = _fly_once(*asked, bag_of, console, conclude, stop, rate)
+        return code
+
+
+def _fly_once(
+    wish: Wish,
+    mission: Mission,
+    bag_of: Callable[[Mission], Path | None],
+    console: Console,
+    conclude: Callable[[Mission, FlightResult], int],
+    stop: StopSignal,
+    rate: float | None,
+) -> tuple[int, tuple[Wish, Mission] | None, float]:
+    """One flight and the wait after it; its exit code, what is asked for next (None: nothing more), and its rate."""
+    warnings = preflight(mission)
+    report(warnings)
+    directors: list[FlightDirector] = []
+
+    def direct(context: Context) -> FlightDirector:
+        directors.append(FlightDirector(context, wish, mission, mission_of_wish))
+        return directors[0]
+
+    with ComposedFlight(mission, bag_of(mission), guests=(direct,)) as flight:
+        (director,) = directors
+        pace = flight.plant.pace
+        if rate is not None:
+            flight.plant.set_parameters([Parameter("rate", value=rate)])
+        if wish.paused:
+            pace.pause()
+        result = with_progress(mission, flight, console, lambda: stop.came or director.asked is not None)
+        result.warnings = warnings
+        director.ended(result)
+        if director.asked is not None:
+            result.interrupted = False
+            print_incidents(result)
+            code = 0
+        else:
+            code = conclude(mission, result)
+            spin_until(flight.executor, lambda: stop.came or director.asked is not None, context=flight.context)
+        asked = None if stop.came else director.asked
+    if asked is not None:
+        console.print(f"flies again: {asked[1].name}, case {asked[1].values.mission.case}", soft_wrap=True)
+    return code, asked, pace.rate

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The latest messages of the topics of a graph, looked at now and then: nothing runs when a message comes.
+
+The middleware keeps the last few messages of each topic; whoever looks takes what is there. A flight at two hundred
+times real time is watched at the cost of one at real time, and one that the watcher does not keep up with loses
+nothing but what is not looked at.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+from css_common.codec import DecodeError, Sample, codec_of, stamp_of
+from css_common.qos import matching_qos
+from css_common.ros_internals import bare_subscription
+from css_msgs.msg import (
+    AttitudeEstimate,
+    ControlStatus,
+    CssVoltages,
+    Faults,
+    Health,
+    RodDipoleCommand,
+    SpacecraftState,
+    SunEstimate,
+    WheelState,
+)
+
+KEPT = 32
+TYPES = {
+    f"css_msgs/msg/{kind.__name__}": kind
+    for kind in (
+        AttitudeEstimate,
+        ControlStatus,
+        CssVoltages,
+        Faults,
+        Health,
+        RodDipoleCommand,
+        SpacecraftState,
+        SunEstimate,
+        WheelState,
+    )
+}
+"""Types of topics that are watched, by their full name."""
+_TELLING = (Health, Faults)
+"""They come when something changes, and hold until the next one."""
+
+
+class Tap:
+    """One topic.
+
+    Attributes:
+        topic: its full name.
+        kind: class of its messages.
+        taken: messages so far.
+        malformed: of those the ones that are none.
+    """
+
+    def __init__(self, node: Node, topic: str, kind: type) -> None:
+        """Begins to listen, to what is latched first."""
+        self.topic, self.kind = topic, kind
+        self.taken = self.malformed = 0
+        publishers = node.get_publishers_info_by_topic(topic)
+        profile = matching_qos(publishers, KEPT) if publishers else _LATCHED
+        self._handle = bare_subscription(node, kind, topic, profile)
+        self._messages: deque[tuple[int, bytes]] = deque(maxlen=KEPT)
+
+    @property
+    def tells(self) -> bool:
+        """Its messages hold until the next one."""
+        return self.kind in _TELLING
+
+    def take(self) -> bool:
+        """Takes what has come; whether its time went back meanwhile, as at the start of another flight."""
+        went_back = False
+        for _ in range(2 * KEPT):
+            with self._handle:
+                taken = self._handle.take_message(self.kind, True)
+            if taken is None:
+                break
+            self.taken += 1
+            try:
+                stamp_ns = stamp_of(taken[0])
+            except DecodeError:
+                self.malformed += 1
+                continue
+            if self._messages and stamp_ns < self._messages[-1][0]:
+                self._messages.clear()
+                went_back = True
+            self._messages.append((stamp_ns, taken[0]))
+        return went_back
+
+    @property
+    def stamps(self) -> list[int]:
+        """Of the messages that are kept, the oldest first [ns]."""
+        return [stamp_ns for stamp_ns, _ in self._messages]
+
+    def forget(self) -> None:
+        """Forgets what was of another flight."""
+        self._messages.clear()
+
+    def at(self, stamp_ns: int) -> Sample | None:
+        """The last message up to a stamp; None without, and where it is damaged."""
+        for stamp, data in reversed(self._messages):
+            if stamp <= stamp_ns:
+                try:
+                    return codec_of(self.kind).decode(data)
+                except DecodeError:
+                    self.malformed += 1
+                    return None
+        return None
+
+    def close(self) -> None:
+        """Listens no more."""
+        self._handle.destroy_when_not_in_use()
+
+
+_LATCHED = QoSProfile(
+    history=HistoryPolicy.KEEP_LAST,
+    depth=KEPT,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+)
+
+
+class Taps:
+    """All topics of a graph that are watched."""
+
+    def __init__(self) -> None:
+        self._taps: dict[str, Tap] = {}
+
+    def __iter__(self) -> Iterator[Tap]:
+        return iter(self._taps.values())
+
+    def follow(self, node: Node, topics: Iterable[tuple[str, type]]) -> bool:
+        """Listens to these topics and to no other; whether that is a change."""
+        wanted = dict(topics)
+        gone = [topic for topic, tap in self._taps.items() if wanted.get(topic) is not tap.kind]
+        for topic in gone:
+            self._taps.pop(topic).close()
+        fresh = [topic for topic in wanted if topic not in self._taps]
+        for topic in fresh:
+            self._taps[topic] = Tap(node, topic, wanted[topic])
+        return bool(gone or fresh)
+
+    def take(self) -> bool:
+        """Takes what has come of all topics; whether time went back, and what is left is of the new flight alone."""
+        went_back = [tap for tap in self if tap.take() and not tap.tells]
+        if not went_back:
+            return False
+        newest = max(stamp for tap in went_back for stamp in tap.stamps)
+        for tap in self:
+            if tap not in went_back and tap.stamps and tap.stamps[-1] > newest:
+                tap.forget()
+        return True
+
+    @property
+    def taken(self) -> int:
+        """Messages of all topics so far."""
+        return sum(tap.taken for tap in self)
+
+    def common_stamp(self) -> int | None:
+        """The newest stamp of which truth, cells and estimates are all there; else the newest of any topic.
+
+        Errors are differences of messages of one instant; at high speed the last of two topics are not.
+        """
+        together = [set(t.stamps) for t in self if t.kind in (SpacecraftState, SunEstimate) and t.stamps]
+        shared = set.intersection(*together) if together else set()
+        if shared:
+            return max(shared)
+        last = [tap.stamps[-1] for tap in self if tap.stamps and not tap.tells]
+        return max(last, default=None)
+
+    def samples(self, stamp_ns: int) -> dict[str, tuple[Any, Sample]]:
+        """What was last said up to a stamp: class and message by topic."""
+        found = ((tap, tap.at(stamp_ns)) for tap in self)
+        return {tap.topic: (tap.kind, sample) for tap, sample in found if sample is not None}
