@@ -45,6 +45,7 @@ VERBS = {
     "check": Verb("find the cells of a bag that lie", "css_calibration", "check"),
     "monte-carlo": Verb("fly thousands of cases of a mission in a compiled loop", "css_monte_carlo", "monte_carlo"),
     "report": Verb("one page of a flight or a study, for any browser", "css_report", "report"),
+    "view": Verb("draw a bag in 3-D, for Foxglove, RViz, PlotJuggler and Rerun", "css_viewers", "view"),
     "coverage": Verb("map how well a cell layout sees the Sun", "css_monte_carlo", "coverage"),
     "new": Verb("write the mission of your own spacecraft: gains, gates and steps computed", "css_design", "new"),
     "layout": Verb("search where the cells should look: error against number of cells", "css_design", "layout"),

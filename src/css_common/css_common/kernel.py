@@ -25,6 +25,7 @@ from numba.core.types import unliteral
 
 from css_common import places
 from css_common.kernel_sources import hash_of, kernel_modules, sources_of
+from css_common.linked_code import only_linked
 
 P = ParamSpec("P")
 R = TypeVar("R", covariant=True)
@@ -138,7 +139,7 @@ def _uncounted(function: Callable[P, R], folder: Path, options: dict[str, Any]) 
 
     @cache
     def called() -> Any:
-        return _without_arrays(_compiled(function, folder / "called", options | _ONLY_FROM_KERNELS))
+        return _without_arrays(_linked(_compiled(function, folder / "called", options | _ONLY_FROM_KERNELS)))
 
     def call_template(args: Iterable[Any], kws: Mapping[str, Any]) -> Any:
         types = tuple(map(unliteral, args))
@@ -148,6 +149,18 @@ def _uncounted(function: Callable[P, R], folder: Path, options: dict[str, Any]) 
     dispatcher.get_call_template = call_template
     dispatcher.get_overload = lambda types: called().get_overload(types)
     return _without_arrays(dispatcher)
+
+
+def _linked(dispatcher: Any) -> Any:
+    """The dispatcher, whose code is linked into that of others and never called from Python."""
+    compile_types = dispatcher.compile
+
+    def compile_to_link(signature: Any) -> Any:
+        with only_linked():
+            return compile_types(signature)
+
+    dispatcher.compile = compile_to_link
+    return dispatcher
 
 
 def _without_arrays(dispatcher: Any) -> Any:

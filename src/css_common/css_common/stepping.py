@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from css_common.codec import Codec, Sample, codec_of
+from css_common.codec import Codec, Sample
 from css_common.component import Component, Cycles, Outgoing, Output, Received, all_conflicts
 from css_common.link import GAP, Link, gap
 from css_common.message_columns import unstack
 from css_common.mission import Event
 from css_common.schema import ParameterError, shaped_values
+from css_common.tree_codec import TreeCodec, encoder_of
 
 # Times of events are decimal seconds, stamps whole nanoseconds.
 _SLACK_S = 1e-9
@@ -48,12 +49,12 @@ class Port(NamedTuple):
 
     key: str
     topic: str
-    codec: Codec
+    codec: Codec | TreeCodec
     real_fields: list  # those that must be finite
     events: bool  # as of `Output`
 
 
-def _finite_fields(codec: Codec, output: Output) -> list:
+def _finite_fields(codec: Codec | TreeCodec, output: Output) -> list:
     return [field for field in codec.real_fields() if field.name not in output.may_lack]
 
 
@@ -104,7 +105,7 @@ class Stepper:
         self.ports = {
             output.key: Port(output.key, output.topic, codec, _finite_fields(codec, output), output.events)
             for output in component_type.all_outputs(name, self.component.values)
-            for codec in (codec_of(output.message_type),)
+            for codec in (encoder_of(output.message_type),)
         }
         self._required = {i.key: i.divider for i in component_type.inputs(name, self.component.values) if i.required}
         self.dividers = {
@@ -171,6 +172,7 @@ class Stepper:
         given = []
         for key, columns in outgoing.items():
             port = self.ports[key]
+            assert isinstance(port.codec, Codec), f"{port.topic}: steps at once give messages of numbers alone"
             if not all(np.all(np.isfinite(getattr(columns, field.name))) for field in port.real_fields):
                 return None
             messages = unstack(port.codec, self.component.frames[key], columns)

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A kernel gives the same to Python and to kernels; constants that it is called with make no copies of it."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 from numba import typeof, types
+from numba.core.codegen import JITCodeLibrary
 from numba.core.errors import NumbaError
 
 from css_common.kernel import kernel, outer_kernel, study_kernel
@@ -70,3 +72,42 @@ def test_a_kernel_that_returns_an_array_is_refused_whoever_calls_it():
         same_table(np.zeros(3))
     with pytest.raises((TypeError, NumbaError), match=reason):
         first_of_table(np.zeros(3))
+
+
+@kernel
+def refused_below_zero(x):
+    if x < 0.0:
+        raise ValueError("below zero")
+    return math.sqrt(x)
+
+
+@kernel
+def root_of_root(x):
+    return refused_below_zero(refused_below_zero(x) - 1.0)
+
+
+def test_errors_of_what_is_linked_come_through():
+    assert root_of_root(16.0) == root_of_root.py_func(16.0) == math.sqrt(3.0)
+    for x in (-1.0, 0.25):
+        with pytest.raises(ValueError, match="below zero"):
+            root_of_root(x)
+
+
+@kernel
+def once_more(p):
+    return three_times(p)
+
+
+@study_kernel
+def in_another_study(p):
+    return once_more(p)
+
+
+def test_machine_code_is_made_of_the_outermost_alone(monkeypatch):
+    made = []
+    finalize = JITCodeLibrary._finalize_specific
+    monkeypatch.setattr(
+        JITCodeLibrary, "_finalize_specific", lambda library: (made.append(library.name), finalize(library))
+    )
+    in_another_study(Point(0.1, 0.7))
+    assert ["in_another_study" in name for name in made] == [True]

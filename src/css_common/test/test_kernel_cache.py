@@ -16,6 +16,7 @@ from presence import present
 
 import css_common.kernel
 import css_common.kernel_sources
+import css_common.linked_code
 import css_common.places
 from css_common.kernel_sources import kernel_modules, sources_of
 
@@ -43,7 +44,7 @@ class Project:
         for package in ("css_common", "css_environment", "css_sim", "css_sim/nodes"):
             (root / package).mkdir()
             (root / package / "__init__.py").touch()
-        for module in (css_common.kernel, css_common.kernel_sources, css_common.places):
+        for module in (css_common.kernel, css_common.kernel_sources, css_common.linked_code, css_common.places):
             shutil.copy(present(module.__file__), root / "css_common")
         self.write_inner("1.0")
         (root / "css_sim" / "outer.py").write_text(OUTER)

@@ -130,16 +130,48 @@ def transmission(screen: Screen, side: float, direction_b: Vec3) -> float:
     return (cosine - screen.dark_cos) / (screen.full_cos - screen.dark_cos)
 
 
+class SoftEdges(NamedTuple):
+    """Where the view of one cell ends: at the edge of its cone and at a screen.
+
+    Attributes:
+        edge_sin: sine of half the cone.
+        hidden: a screen hides part of the sky.
+        axis_b: of the screen, towards what the cell sees; a cell on its other side has it mirrored, with the same edge.
+        shift: cosine between normal and axis.
+        middle, ramp: cosine in the middle of the screen's edge, and half of what the edge takes.
+        screen_sin: sine there.
+    """
+
+    edge_sin: float
+    hidden: bool
+    axis_b: Vec3
+    shift: float
+    middle: float
+    ramp: float
+    screen_sin: float
+
+
+@kernel
+def soft_edges(normal_b: Vec3, side: float, screen: Screen, edge: float) -> SoftEdges:
+    """Edges of the view of a cell, whose half cone has the cosine `edge`."""
+    axis_b = scale(1.0 if side > 0.0 else -1.0, screen.axis_b)
+    middle = 0.5 * (screen.full_cos + screen.dark_cos)
+    return SoftEdges(
+        max(NARROWEST_SIN, math.sqrt(max(0.0, 1.0 - edge * edge))),
+        side != 0.0 and dot(screen.axis_b, screen.axis_b) > 0.0,
+        axis_b,
+        dot(normal_b, axis_b),
+        middle,
+        0.5 * (screen.full_cos - screen.dark_cos),
+        math.sqrt(max(0.0, 1.0 - middle * middle)),
+    )
+
+
 @kernel
 def _output_of_one(light, normal_b: Vec3, side: float, i: int, screen: Screen, edge: float, dcm_bn: Mat3) -> float:
     """The same sum as of `albedo_output` for a cell with a view of its own, patch by patch."""
-    edge_sin = max(NARROWEST_SIN, math.sqrt(max(0.0, 1.0 - edge * edge)))
-    hidden = side != 0.0 and dot(screen.axis_b, screen.axis_b) > 0.0
-    axis_b = scale(1.0 if side > 0.0 else -1.0, screen.axis_b)
-    shift = dot(normal_b, axis_b)
-    middle = 0.5 * (screen.full_cos + screen.dark_cos)
-    screen_sin = math.sqrt(max(0.0, 1.0 - middle * middle))
-    ramp = 0.5 * (screen.full_cos - screen.dark_cos)
+    edges = soft_edges(normal_b, side, screen, edge)
+    edge_sin, axis_b, middle, ramp = edges.edge_sin, edges.axis_b, edges.middle, edges.ramp
     total = 0.0
     for j in range(PATCHES):
         if not light[LIGHT + j] > 0.0:
@@ -148,12 +180,12 @@ def _output_of_one(light, normal_b: Vec3, side: float, i: int, screen: Screen, e
         if is_blocked(screen, i, unit(direction_b)):
             continue
         part, moved = 1.0, 0.0
-        if hidden:
-            size2 = (float(light[SIZE + j]) * screen_sin) ** 2
+        if edges.hidden:
+            size2 = (float(light[SIZE + j]) * edges.screen_sin) ** 2
             inverse = 1.0 / math.sqrt(size2 + ramp * ramp)
             part = min(max(0.5 + 0.5 * (dot(axis_b, direction_b) - middle) * inverse, 0.0), 1.0)
             moved = (1.0 - part) * size2 * inverse
-        mean, width = dot(normal_b, direction_b) + moved * shift, float(light[SIZE + j]) * edge_sin
+        mean, width = dot(normal_b, direction_b) + moved * edges.shift, float(light[SIZE + j]) * edge_sin
         high = mean + width
         low = min(max(mean - width, edge), high)
         total += part * float(light[LIGHT + j]) * (high - low) * (high + low)

@@ -13,7 +13,7 @@ import math
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, add, cross, dot, multiply, scale, unit
-from css_environment.albedo import NARROWEST_SIN, Screen, is_blocked, view_cosine
+from css_environment.albedo import Screen, is_blocked, soft_edges, view_cosine
 from css_environment.earth_light import DISC, DISC_LIGHT, LIGHT, PATCHES, SIZE, X, Y, Z
 
 
@@ -39,22 +39,16 @@ def albedo_slopes(light, cells, screen: Screen, cos_half_view: float, dcm_bn: Ma
 
 @kernel
 def _slope(light, normal_b: Vec3, side: float, i: int, screen: Screen, edge: float, dcm_bn: Mat3) -> Vec3:
-    edge_sin = max(NARROWEST_SIN, math.sqrt(max(0.0, 1.0 - edge * edge)))
-    hidden = side != 0.0 and dot(screen.axis_b, screen.axis_b) > 0.0
-    # the mirrored axis of a cell on the negative side has the same edge
-    axis_b = scale(1.0 if side > 0.0 else -1.0, screen.axis_b)
-    shift = dot(normal_b, axis_b)
-    middle = 0.5 * (screen.full_cos + screen.dark_cos)
-    screen_sin = math.sqrt(max(0.0, 1.0 - middle * middle))
-    ramp = 0.5 * (screen.full_cos - screen.dark_cos)
+    edges = soft_edges(normal_b, side, screen, edge)
+    edge_sin, axis_b, shift, middle, ramp = edges.edge_sin, edges.axis_b, edges.shift, edges.middle, edges.ramp
     by_normal, by_axis = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for j in range(PATCHES):
         direction_n = (float(light[X + j]), float(light[Y + j]), float(light[Z + j]))
         direction_b = multiply(dcm_bn, direction_n)
         width = float(light[SIZE + j]) * edge_sin
         part, part_slope, moved, moved_slope = 1.0, 0.0, 0.0, 0.0
-        if hidden:
-            size2 = (float(light[SIZE + j]) * screen_sin) ** 2
+        if edges.hidden:
+            size2 = (float(light[SIZE + j]) * edges.screen_sin) ** 2
             inverse = 1.0 / math.sqrt(size2 + ramp * ramp)
             free = 0.5 + 0.5 * (dot(axis_b, direction_b) - middle) * inverse
             part = min(max(free, 0.0), 1.0)

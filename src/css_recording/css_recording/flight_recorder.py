@@ -14,20 +14,19 @@ from typing import NamedTuple
 from css_common.edge import HISTORY
 from css_recording.bag_metadata import Topic
 from css_recording.bag_writer import BagWriter
-from css_recording.schemas import first_field_type, schema_of
+from css_recording.schemas import header_place, schema_of
 
 _STAMP = struct.Struct("<iI")
-_STAMPED_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 # Their stamps are of the wall clock, also where everything else is in simulated time.
 _WALL_CLOCK_TOPICS = ("/parameter_events", "/rosout")
 _MOST_HELD = 1000
 
 
-def is_stamped(topic: Topic) -> bool:
-    """Whether messages begin with a stamp (a Header or a Time) that tells the time of the flight."""
+def stamp_place(topic: Topic) -> int | None:
+    """Where in a serialised message the stamp lies that tells the time of the flight; None: it has none."""
     if topic.name in _WALL_CLOCK_TOPICS:
-        return False
-    return first_field_type(topic.schema or schema_of(topic.type)) in _STAMPED_FIRST
+        return None
+    return header_place(topic.schema or schema_of(topic.type))
 
 
 class Gap(NamedTuple):
@@ -65,7 +64,7 @@ class FlightRecorder:
         self.gaps: dict[str, Gap] = {}
         self._filed_by_another: dict[str, int] = {}
         self._spacing_ns = dict(spacing_ns or {})
-        self._stamped = {topic.name: is_stamped(topic) for topic in writer.topics}
+        self._stamp_places = {topic.name: stamp_place(topic) for topic in writer.topics}
         self._last_ns: dict[str, int] = {}
         self._latest_ns: int | None = None
         self._held: list[tuple[str, bytes, int]] = []
@@ -89,7 +88,7 @@ class FlightRecorder:
     def add_topic(self, topic: Topic) -> None:
         """Makes a topic known."""
         self.writer.add_topic(topic)
-        self._stamped[topic.name] = is_stamped(topic)
+        self._stamp_places[topic.name] = stamp_place(topic)
         self._received[topic.name] += 0
 
     def hand_over(self, topic: str) -> None:
@@ -103,11 +102,12 @@ class FlightRecorder:
         Raises:
             BagError: the recording cannot be written any more.
         """
-        if not self._stamped[topic] or len(data) < 12:
+        place = self._stamp_places[topic]
+        if place is None or len(data) < place + _STAMP.size:
             self._received[topic] += 1
             self._file_unstamped(topic, data)
             return None
-        seconds, nanoseconds = _STAMP.unpack_from(data, 4)
+        seconds, nanoseconds = _STAMP.unpack_from(data, place)
         stamp_ns = seconds * 1_000_000_000 + nanoseconds
         if self._filed_by_another and self._is_repetition(topic, stamp_ns):
             self.counters["answered_again"] += 1

@@ -10,10 +10,10 @@ import json
 import re
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rosbags.interfaces import Nodetype
-from rosbags.interfaces.typing import Typesdict
+from rosbags.interfaces.typing import FieldDesc, Typesdict
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
@@ -22,6 +22,7 @@ from css_recording.errors import BagError
 
 _SEPARATOR = "=" * 80
 _CHAR = re.compile(r"^\s*char\b", re.MULTILINE)
+_STAMPED_FIRST = ("std_msgs/msg/Header", "builtin_interfaces/msg/Time")
 _PRIMITIVES = frozenset(
     ["bool", "byte", "char", "string", "wstring", "float32", "float64"]
     + [f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)]
@@ -92,12 +93,25 @@ def is_installed(type_name: str) -> bool:
     return True
 
 
-def first_field_type(schema: MessageSchema) -> str | None:
-    """Full name of the message type of the first field; None when it is no message, or there is no field."""
-    _, fields = types_of(schema)[schema.type_name]
-    if not fields or fields[0][1][0] != Nodetype.NAME:
+def header_place(schema: MessageSchema) -> int | None:
+    """Where in a serialised message its stamp lies, counted from the beginning of the encapsulation [bytes].
+
+    That of a message which begins with a Header or a Time, or with a list of such messages, as markers and transforms
+    do: then that of the first of them. None: it begins with something else.
+    """
+    types = types_of(schema)
+    fields = types[schema.type_name][1]
+    if not fields:
         return None
-    return str(fields[0][1][1])
+    kind: FieldDesc = fields[0][1]
+    if kind[0] == Nodetype.NAME:
+        return 4 if kind[1] in _STAMPED_FIRST else None
+    listed: Any = kind[1]
+    if kind[0] != Nodetype.SEQUENCE or listed[0][0] != Nodetype.NAME:
+        return None
+    inner = types[str(listed[0][1])][1]
+    begins = bool(inner) and inner[0][1][0] == Nodetype.NAME and inner[0][1][1] in _STAMPED_FIRST
+    return 8 if begins else None  # behind the number of those that follow
 
 
 def types_of(schema: MessageSchema) -> Typesdict:

@@ -1,14 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages and recordings that the tests share. Messages are serialised by `rosbags`, not by Sunpoint."""
 
-import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mcap_doctor import doctor as doctor
 from rclpy.context import Context
 from rclpy.node import Node
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -88,19 +87,6 @@ def typestore_of(type_names: list[str]) -> Typestore:
 def flight() -> Flight:
     """The made-up flight."""
     return Flight(typestore_of([topic.type for topic in Flight.topics]))
-
-
-@pytest.fixture(scope="session")
-def doctor() -> Callable[[Path], str]:
-    """Checks the structure of an MCAP file with `pymcap-cli doctor`; gives what it prints."""
-
-    def check(path: Path) -> str:
-        command = [str(Path(sys.executable).with_name("pymcap-cli")), "doctor", str(path)]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
-        assert run.returncode == 0, run.stdout + run.stderr
-        return run.stdout
-
-    return check
 
 
 class Graph:

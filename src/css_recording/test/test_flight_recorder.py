@@ -6,7 +6,8 @@ import pytest
 from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
-from css_recording.flight_recorder import FlightRecorder, is_stamped
+from css_recording.errors import BagError
+from css_recording.flight_recorder import FlightRecorder, stamp_place
 
 STATUS = Topic("/status", "std_msgs/msg/String")
 EVENTS = Topic("/parameter_events", "rcl_interfaces/msg/ParameterEvent")
@@ -26,31 +27,31 @@ def recorded(recorder):
 
 
 @pytest.mark.parametrize(
-    ("name", "type_name", "stamped"),
+    ("name", "type_name", "place"),
     [
         *[
-            (f"/{name}", f"css_msgs/msg/{name}", True)
+            (f"/{name}", f"css_msgs/msg/{name}", 4)
             for name in ("CssVoltages", "ControlStatus", "SunEstimate", "SpacecraftState", "WheelState")
         ],
-        ("/imu", "sensor_msgs/msg/Imu", True),
-        ("/header", "std_msgs/msg/Header", True),
-        ("/clock", "rosgraph_msgs/msg/Clock", True),
-        ("/pose", "geometry_msgs/msg/Pose", False),
-        ("/text", "std_msgs/msg/String", False),
-        ("/empty", "std_msgs/msg/Empty", False),
-        ("/transforms", "tf2_msgs/msg/TFMessage", None),
-        ("/parameter_events", "rcl_interfaces/msg/ParameterEvent", False),
-        ("/rosout", "rcl_interfaces/msg/Log", False),
+        ("/imu", "sensor_msgs/msg/Imu", 4),
+        ("/header", "std_msgs/msg/Header", 4),
+        ("/clock", "rosgraph_msgs/msg/Clock", 4),
+        ("/pose", "geometry_msgs/msg/Pose", None),
+        ("/text", "std_msgs/msg/String", None),
+        ("/empty", "std_msgs/msg/Empty", None),
+        ("/markers", "visualization_msgs/msg/MarkerArray", 8),
+        ("/points", "geometry_msgs/msg/Polygon", None),
+        ("/parameter_events", "rcl_interfaces/msg/ParameterEvent", None),
+        ("/rosout", "rcl_interfaces/msg/Log", None),
     ],
 )
-def test_which_messages_begin_with_a_stamp(name, type_name, stamped):
-    if stamped is None:
-        from css_recording.errors import BagError
+def test_where_the_stamp_of_a_message_lies(name, type_name, place):
+    assert stamp_place(Topic(name, type_name)) == place
 
-        with pytest.raises(BagError, match="not installed"):
-            is_stamped(Topic(name, type_name))
-    else:
-        assert is_stamped(Topic(name, type_name)) is stamped
+
+def test_a_type_that_is_not_installed_is_named():
+    with pytest.raises(BagError, match=r"no_msgs.*not installed"):
+        stamp_place(Topic("/transforms", "no_msgs/msg/Nothing"))
 
 
 def test_log_time_is_the_stamp_of_the_header(flight, recorder):

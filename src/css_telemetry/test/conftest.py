@@ -1,24 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tests of imports share: the structure of a recording as another tool sees it."""
+"""What tests of imports share."""
 
-import subprocess
-import sys
-from collections.abc import Callable
-from pathlib import Path
-
-import pytest
-
-from css_common.testing import DEADLINE
-
-
-@pytest.fixture(scope="session")
-def doctor() -> Callable[[Path], str]:
-    """Checks the structure of an MCAP file with `pymcap-cli doctor`; gives what it prints."""
-
-    def check(path: Path) -> str:
-        command = [str(Path(sys.executable).with_name("pymcap-cli")), "doctor", str(path)]
-        run = subprocess.run(command, capture_output=True, text=True, timeout=DEADLINE, check=False)
-        assert run.returncode == 0, run.stdout + run.stderr
-        return run.stdout
-
-    return check
+from mcap_doctor import doctor as doctor
