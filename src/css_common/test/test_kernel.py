@@ -106,8 +106,11 @@ def in_another_study(p):
 def test_machine_code_is_made_of_the_outermost_alone(monkeypatch):
     made = []
     finalize = JITCodeLibrary._finalize_specific
-    monkeypatch.setattr(
-        JITCodeLibrary, "_finalize_specific", lambda library: (made.append(library.name), finalize(library))
-    )
+
+    def noted(library):
+        made.append(library.name)
+        return finalize(library)
+
+    monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", noted)
     in_another_study(Point(0.1, 0.7))
     assert ["in_another_study" in name for name in made] == [True]
