@@ -82,7 +82,6 @@ _LONG = (
     "tests/test_three_hosts.py",
     "tests/test_without_ros.py::test_budgets",
     "tests/test_without_ros.py::test_layouts",
-    "tests/test_without_ros.py::test_papers",
 )
 
 

@@ -194,9 +194,3 @@ def test_budgets(both, options):
     outputs = both("budget", *options, "--json", expected=(0, 1))
     assert result(outputs[0]) == result(outputs[1])
     assert result(outputs[0])["heading"]["sources"]
-
-
-def test_papers(both, tmp_path):
-    outputs = both("reproduce", "clark", "--quick", "--cases", "2", "--out", "paper", "--json")
-    assert result(outputs[0]) == result(outputs[1])
-    assert_same_files(tmp_path)

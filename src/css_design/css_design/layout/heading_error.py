@@ -68,7 +68,8 @@ def heading_error(
         errors,
         out,
     )
-    return HeadingError(*map(float, out), tail_mean(errors, scenes.weight))
+    mean, worst, failed, failed_worst, unseen = out.tolist()
+    return HeadingError(mean, worst, failed, failed_worst, unseen, tail_mean(errors, scenes.weight))
 
 
 def tail_mean(errors: np.ndarray, weight: np.ndarray, share: float = TAIL) -> float:
