@@ -6,7 +6,6 @@ import io
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -30,19 +29,14 @@ def test_every_block_has_a_mark(page):
 
 
 @pytest.fixture
-def folder(tmp_path, monkeypatch) -> Iterator[Path]:
+def folder(tmp_path, monkeypatch) -> Path:
     """A folder as a checkout is, in which nothing is left of what blocks write."""
     for linked in _LINKED:
         (tmp_path / linked).symlink_to(ROOT / linked)
     (tmp_path / "bags").mkdir()
     (tmp_path / "bags" / "reference").symlink_to(ROOT / "bags" / "reference")
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))
-    before = set(sys.modules)
-    yield tmp_path
-    for module in set(sys.modules) - before:
-        if (getattr(sys.modules[module], "__file__", None) or "").startswith(str(tmp_path)):
-            del sys.modules[module]
+    return tmp_path
 
 
 def run_page(page: Path, folder: Path, long: bool) -> None:
@@ -51,6 +45,8 @@ def run_page(page: Path, folder: Path, long: bool) -> None:
     Args:
         long: those marked `run long`, too.
     """
+    # compiled code of a page's own package belongs to the classes of one import
+    apart = any(block.mark == "file" and block.detail.endswith(".py") for block in blocks(page))
     names: dict = {"__name__": "__main__"}
     printed: str | None = None
     for block in blocks(page):
@@ -60,7 +56,8 @@ def run_page(page: Path, folder: Path, long: bool) -> None:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(block.text, encoding="utf-8")
         elif block.mark == "run" or (long and block.mark == "run long"):
-            printed = python(block, names, where) if block.language == "python" else shell(block, folder, where)
+            command = ["bash", "-e", "-c"] if block.language != "python" else [sys.executable, "-c"] if apart else []
+            printed = run(command, block, folder, where) if command else python(block, names, where)
         elif block.mark == "output":
             assert printed is None or missing(block.text, printed) == [], f"{where}: not in\n{printed}"
         if block.mark in ("illustrative", "run long") and not (long and block.mark == "run long"):
@@ -74,11 +71,13 @@ def python(block: Block, names: dict, where: str) -> str:
     return out.getvalue()
 
 
-def shell(block: Block, folder: Path, where: str) -> str:
+def run(command: list[str], block: Block, folder: Path, where: str) -> str:
     env = {**os.environ, "TERM": "dumb", "COLUMNS": "200"}
+    if block.language == "python":
+        env["PYTHONPATH"] = os.pathsep.join(filter(None, (str(folder), env.get("PYTHONPATH"))))
     env.pop("SUNPOINT_VERB", None)
     done = subprocess.run(
-        ["bash", "-e", "-c", block.text], cwd=folder, env=env, capture_output=True, text=True, timeout=900, check=False
+        [*command, block.text], cwd=folder, env=env, capture_output=True, text=True, timeout=900, check=False
     )
     assert done.returncode == 0, f"{where}: exit code {done.returncode}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}"
     return done.stdout

@@ -23,7 +23,7 @@ from css_common.kernel_sources import KERNEL_PACKAGES
 from css_docs.errors import DocsError
 from css_docs.figure_files import FIGURES
 from css_docs.links import relative
-from css_docs.reference.nodes import page_of
+from css_docs.reference.node_pages import page_of
 from css_docs.reference.text import code, paragraphs
 from css_docs.staging import REPOSITORY
 

@@ -10,7 +10,7 @@ from css_common.shared_sections import shared_parameters
 from css_docs import algorithm_pages
 from css_docs.figure_files import figure_names
 from css_docs.made_pages import made_pages
-from css_docs.reference import messages, nodes
+from css_docs.reference import messages, node_pages
 from css_docs.reference.verbs import help_of, table_of_verbs
 from css_docs.staging import Stage
 
@@ -44,7 +44,7 @@ def test_every_node_file_has_its_page(made):
 
 def test_every_parameter_stands_on_the_page_of_its_node_or_among_the_mission_keys(made):
     shared, keys = shared_parameters(), page(made, "mission_keys.md")
-    for (package, name), kind in nodes.components(ROOT).items():
+    for (package, name), kind in node_pages.components(ROOT).items():
         own = page(made, "nodes", package, f"{name}.md")
         for parameter in kind.table():
             assert f"| `{parameter.name}`" in (keys if parameter.name in shared else own), (name, parameter.name)
@@ -93,7 +93,7 @@ def test_every_kernel_is_told_of_on_a_page_of_an_algorithm():
 
 def test_every_node_that_flies_is_told_of_on_a_page_of_an_algorithm():
     told = algorithm_pages.runs(ROOT)
-    flown = {f"{package}/{name}" for package, name in nodes.components(ROOT)}
+    flown = {f"{package}/{name}" for package, name in node_pages.components(ROOT)}
     # drivers and what only draws have no algorithm: they are on pages of their own
     free = {node for node in flown if node.startswith("css_drivers/") or node.endswith("/visualizer")}
     assert sorted(flown - free - told.keys()) == []

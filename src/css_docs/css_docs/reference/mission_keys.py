@@ -10,8 +10,8 @@ from css_common.link_kinds import KINDS as LINK_KINDS
 from css_common.mission_script import ACTIONS, EVENT_KEYS
 from css_common.readme_parameters import FAULT_HEADER, HEADER, fault_row, row
 from css_common.shared_sections import shared_sections
-from css_docs.reference.nodes import FOLDER as NODES
-from css_docs.reference.nodes import KEYS, components
+from css_docs.reference.node_pages import FOLDER as NODES
+from css_docs.reference.node_pages import KEYS, components
 from css_docs.reference.text import code, paragraphs, plain, table
 from css_docs.staging import REPOSITORY
 
