@@ -29,9 +29,9 @@ from css_console.parameters import Parameters
 from css_console.requests import Requests
 from css_console.taps import TYPES, Taps
 
-_INVENTORY_EVERY_S = 1.0  # wall time [s] between looks around
+_INVENTORY_EVERY_S = 3.0  # wall time [s] between looks around
 _LOOK_EVERY_S = 0.2  # the same before anything flies
-_CALLBACKS = 24  # in a look; a node of the graph tells its health once a second
+_CALLBACKS = 10  # in a look; a node of the graph tells its health once a second
 _FACTOR_OVER_S = 2.0
 _LEVELS = {
     DiagnosticStatus.OK: "ok",
