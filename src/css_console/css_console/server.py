@@ -18,7 +18,7 @@ from css_console.guards import ADDRESS, HEADERS, Guard
 from css_console.orders import LONGEST
 from css_console.stage import Stage
 
-LOOKS_PER_S = 15.0
+LOOKS_PER_S = 10.0
 _SEND_BUFFER = 1 << 18  # bytes that the system keeps for a browser that does not read
 _MOST_BROWSERS = 16
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}

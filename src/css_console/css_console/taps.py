@@ -28,7 +28,7 @@ from css_msgs.msg import (
     WheelState,
 )
 
-KEPT = 32
+KEPT = 12
 TYPES = {
     f"css_msgs/msg/{kind.__name__}": kind
     for kind in (

@@ -29,9 +29,10 @@ from css_console.parameters import Parameters
 from css_console.requests import Requests
 from css_console.taps import TYPES, Taps
 
-_INVENTORY_EVERY_S = 1.0  # wall time [s] between looks around
+_INVENTORY_EVERY_S = 3.0  # wall time [s] between looks around
 _LOOK_EVERY_S = 0.2  # the same before anything flies
-_CALLBACKS = 24  # in a look; a node of the graph tells its health once a second
+# In a look: a node of the graph tells its health once a second; at first it answers what it is asked.
+_CALLBACKS, _FIRST_CALLBACKS = 4, 24
 _FACTOR_OVER_S = 2.0
 _LEVELS = {
     DiagnosticStatus.OK: "ok",
@@ -98,7 +99,7 @@ class Watcher:
 
     def look(self) -> bool:
         """Looks once; whether there is an instant that was not there before."""
-        for _ in range(_CALLBACKS):
+        for _ in range(_FIRST_CALLBACKS if self.frame is None else _CALLBACKS):
             self._executor.spin_once(timeout_sec=0.0)
         self._requests.look()
         now = time.monotonic()
