@@ -7,7 +7,6 @@ from typing import Any
 
 from css_design.errors import DesignError
 from css_design.new_mission.directions import Vector, direction
-from css_sensors.cells import MOST_CELLS
 
 NONE = "none"
 """Word for what a spacecraft does not have."""
@@ -53,6 +52,8 @@ def directions(text: str) -> tuple[Vector, ...]:
     if text.strip() == "all":
         text = "+x,-x,+y,-y,+z,-z"
     words = text.split(",")
+    from css_sensors.cells import MOST_CELLS  # it loads what compiles, which help does without
+
     if len(words) > MOST_CELLS:
         raise DesignError(f"{len(words)} directions given, expected 1 to {MOST_CELLS}")
     return tuple(direction(word) for word in words)
