@@ -7,10 +7,12 @@ import signal
 import subprocess
 
 import aiohttp
+import pytest
 from console_process import console
 
 from css_bringup.processes import executable_path
 
+pytestmark = pytest.mark.timeout(900)  # its flight compiles what no test before it has
 FLY = ("okeefe_2013", "--stay", "--paused", "--no-record")
 
 

@@ -24,9 +24,7 @@ from css_calibration.calibration_result import calibration_file, rows_of, unobse
 from css_calibration.cell_fit_model import normals_of
 from css_calibration.commands import calibrate as command
 from css_calibration.recorded import Recorded
-from css_common.mission import load_mission
 from css_common.mission_extends import sections_alone
-from css_monte_carlo.mission_parts import NoPlace, parts_of
 from css_msgs.msg import CssVoltages, SpacecraftState
 
 THIN = 3
@@ -143,8 +141,6 @@ def test_the_file_is_read_by_estimators_and_gives_the_corrected_readings(flights
     assert values.cells.measured.normals == pytest.approx(normals_of(c.data.normals_b, c.parameters), abs=1e-8)
     assert values.cells.measured.scales == pytest.approx(c.parameters[:, 0], abs=1e-6)
     assert values.gyro.measured.bias_deg_h[0] == pytest.approx(np.degrees(c.bias.x) * 3600.0, abs=1e-3)
-    with pytest.raises(NoPlace, match="calibration"):
-        parts_of(load_mission("okeefe_2013").with_sections(sections_alone(file)))
 
 
 def test_what_it_finds_of_a_bag_is_taken_by_replay(flights, tmp_path, capsys):

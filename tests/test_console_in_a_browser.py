@@ -17,7 +17,10 @@ from browser import NAMES, Browser, browser_path
 from page_checks import LAYOUT_FAULTS, WIDTHS
 
 BROWSER = browser_path() or ""
-pytestmark = pytest.mark.skipif(not BROWSER, reason=f"no browser on this machine, looked for {', '.join(NAMES)}")
+pytestmark = [
+    pytest.mark.skipif(not BROWSER, reason=f"no browser on this machine, looked for {', '.join(NAMES)}"),
+    pytest.mark.timeout(900),  # its flight compiles what no test before it has
+]
 PICTURE = "SUNPOINT_PICTURE"
 """Environment variable: file that gets the picture of the README."""
 OF_THE_MACHINE = ("swiftshader", "GL Driver Message")  # it has no graphics processor
@@ -73,7 +76,7 @@ def test_a_flight_is_seen_held_and_stepped():
         page = Page(browser)
         browser.open(running.address)
         page.until(f"{TIME} > 1")
-        assert page.text("title") == "okeefe_2013, case 0"
+        page.has("title", "okeefe_2013, case 0")
         page.press("#toggle")
         at = held(page)
         page.press("#step")
