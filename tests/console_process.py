@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A console in a process of its own, as `./sunpoint console` starts it."""
+"""A console in a process of its own, as `./sunpoint console` starts it; `WITHOUT` says why there can be none."""
 
 import contextlib
 import os
@@ -10,6 +10,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from css_bringup.processes import executable_path
+from css_console.errors import ConsoleError
+from css_console.provision import provide
+
+try:
+    provide(print)  # once: a test is not to wait for it
+    WITHOUT = ""
+except ConsoleError as why:  # neither here nor to be had
+    WITHOUT = str(why)
 
 
 class Running(NamedTuple):

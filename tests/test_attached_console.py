@@ -6,13 +6,16 @@ import json
 import signal
 import subprocess
 
-import aiohttp
 import pytest
-from console_process import console
+from console_process import WITHOUT, console
 
 from css_bringup.processes import executable_path
 
-pytestmark = pytest.mark.timeout(900)  # its flight compiles what no test before it has
+aiohttp = pytest.importorskip("aiohttp", reason=WITHOUT)
+pytestmark = [
+    pytest.mark.skipif(bool(WITHOUT), reason=WITHOUT),
+    pytest.mark.timeout(900),  # its flight compiles what no test before it has
+]
 FLY = ("okeefe_2013", "--stay", "--paused", "--no-record")
 
 

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from console_process import console
+from console_process import WITHOUT, console
 from listing import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -19,6 +19,7 @@ from page_checks import LAYOUT_FAULTS, WIDTHS
 BROWSER = browser_path() or ""
 pytestmark = [
     pytest.mark.skipif(not BROWSER, reason=f"no browser on this machine, looked for {', '.join(NAMES)}"),
+    pytest.mark.skipif(bool(WITHOUT), reason=WITHOUT),
     pytest.mark.timeout(900),  # its flight compiles what no test before it has
 ]
 PICTURE = "SUNPOINT_PICTURE"
@@ -77,6 +78,7 @@ def test_a_flight_is_seen_held_and_stepped():
         browser.open(running.address)
         page.until(f"{TIME} > 1")
         page.has("title", "okeefe_2013, case 0")
+        page.has("toggle", "Pause")
         page.press("#toggle")
         at = held(page)
         page.press("#step")

@@ -40,6 +40,7 @@ _LEVELS = {
     DiagnosticStatus.ERROR: "error",
     DiagnosticStatus.STALE: "stale",
 }
+_MOVES = 3  # instants in a row by which time goes on; one by one it may be stepped
 
 
 class Watcher:
@@ -83,6 +84,7 @@ class Watcher:
         self._looked = -math.inf
         self._times: deque[tuple[float, int]] = deque()
         self._diagnostics: dict[str, dict[str, Any]] = {}
+        self._moves = 0  # instants that came since the node that paces time has told of itself
         self._states: dict[str, str] = {}
         self._watched_states: dict[str, Any] = {}
         self._node.create_subscription(DiagnosticArray, "/diagnostics", self._note_diagnostics, 100)
@@ -155,6 +157,7 @@ class Watcher:
             self.version += 1
         self.history.add(frame.shown["time"], frame.row)
         if fresh:
+            self._moves += 1
             self._times.append((now, stamp_ns))
         while self._times and self._times[-1][0] - self._times[0][0] > _FACTOR_OVER_S:
             self._times.popleft()
@@ -208,6 +211,8 @@ class Watcher:
                 "counters": {value.key: value.value for value in status.values},
             }
             self._diagnostics[status.name] = row
+            if status.name == self.inventory.pace:
+                self._moves = 0
 
     def _follow_states(self, nodes: tuple[str, ...]) -> None:
         for gone in set(self._watched_states) - set(nodes):
@@ -241,12 +246,20 @@ class Watcher:
         return rows
 
     def pace(self) -> dict[str, Any]:
-        """Whether time is held, and the rate, as the node that paces it tells; rate 0: as fast as it goes."""
+        """Whether time is held, and the rate, as the node that paces it tells; rate 0: as fast as it goes.
+
+        What a node tells once a second may be older than what was just asked of it: time that goes on is not held.
+        """
         node = self.inventory.pace
         rate = self.parameters.values.get(node, {}).get("rate")
         told = self._diagnostics.get(node, {}).get("message", "")
         limited = isinstance(rate, float) and math.isfinite(rate)
-        return {"node": node, "paused": told == "paused", "rate": rate if limited else 0.0, "state": told}
+        return {
+            "node": node,
+            "paused": told == "paused" and self._moves < _MOVES,
+            "rate": rate if limited else 0.0,
+            "state": told,
+        }
 
     def faults(self) -> list[str]:
         """Faults as nodes have them in their parameters; of a recording those that it tells."""
@@ -295,6 +308,7 @@ class Watcher:
         if good and node == self.inventory.pace and name in ("pause", "resume"):
             row = self._diagnostics.setdefault(node, {"node": node, "level": "ok", "counters": {}})
             row["message"] = "paused" if name == "pause" else "playing"
+            self._moves = 0
 
     def columns(self) -> list[list[float | None]]:
         """The strip charts so far: time and a column for each series, None where there is none."""
