@@ -12,8 +12,8 @@ from rclpy.node import Node
 from css_console.calls import value_of
 
 _OF_ROS = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-Ask = Callable[[str, type, Any, Callable[[Any], None]], None]
-"""Asks a service by its full name, its type and a request; the answer is handed on when it comes."""
+Ask = Callable[[str, type, Any, Callable[[Any], None], Callable[[str], object]], None]
+"""Asks a service by its full name, its type and a request; the answer is handed on when it comes, or why none does."""
 
 
 class Parameters:
@@ -60,16 +60,21 @@ class Parameters:
         return next((values[name] for values in self.values.values() if name in values), None)
 
     def _list(self, node: str) -> None:
-        self._ask(f"{node}/list_parameters", ListParameters, ListParameters.Request(), lambda a: self._listed(node, a))
+        request = ListParameters.Request()
+        self._ask_of(node, "list_parameters", ListParameters, request, lambda a: self._listed(node, a))
+
+    def _ask_of(self, node: str, name: str, kind: type, request: Any, answered: Callable[[Any], None]) -> None:
+        """Asks a node; one that does not answer, as while it compiles, is asked again with the next look around."""
+        self._ask(f"{node}/{name}", kind, request, answered, lambda why: self._read.discard(node))
 
     def _listed(self, node: str, answer: Any) -> None:
         names = [name for name in answer.result.names if not name.startswith(_OF_ROS)]
         if not names:
             return
         request, describe = GetParameters.Request(names=names), DescribeParameters.Request(names=names)
-        self._ask(f"{node}/get_parameters", GetParameters, request, lambda a: self._got(node, names, a.values))
-        self._ask(
-            f"{node}/describe_parameters", DescribeParameters, describe, lambda a: self._described(node, a.descriptors)
+        self._ask_of(node, "get_parameters", GetParameters, request, lambda a: self._got(node, names, a.values))
+        self._ask_of(
+            node, "describe_parameters", DescribeParameters, describe, lambda a: self._described(node, a.descriptors)
         )
 
     def _got(self, node: str, names: list[str], values: Iterable[Any]) -> None:
