@@ -2,6 +2,7 @@
 """Parameters of nodes that take their time to answer."""
 
 from types import SimpleNamespace
+from typing import Any
 
 from rcl_interfaces.msg import ListParametersResult
 from rcl_interfaces.srv import ListParameters
@@ -11,7 +12,7 @@ from css_console.parameters import Parameters
 
 def test_a_node_that_does_not_answer_is_asked_again():
     asked = []
-    node = SimpleNamespace(create_subscription=lambda *given: None)
+    node: Any = SimpleNamespace(create_subscription=lambda *given: None)
     parameters = Parameters(node, lambda *given: asked.append(given))
     parameters.follow(["/ekf"])
     parameters.follow(["/ekf"])
