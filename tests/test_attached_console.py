@@ -14,7 +14,7 @@ from css_bringup.processes import executable_path
 aiohttp = pytest.importorskip("aiohttp", reason=WITHOUT)
 pytestmark = [
     pytest.mark.skipif(bool(WITHOUT), reason=WITHOUT),
-    pytest.mark.timeout(900),  # its flight compiles what no test before it has
+    pytest.mark.timeout(600),  # its flight compiles what no test before it has
 ]
 FLY = ("okeefe_2013", "--stay", "--paused", "--no-record")
 

@@ -20,7 +20,7 @@ BROWSER = browser_path() or ""
 pytestmark = [
     pytest.mark.skipif(not BROWSER, reason=f"no browser on this machine, looked for {', '.join(NAMES)}"),
     pytest.mark.skipif(bool(WITHOUT), reason=WITHOUT),
-    pytest.mark.timeout(900),  # its flight compiles what no test before it has
+    pytest.mark.timeout(600),  # its flight compiles what no test before it has
 ]
 PICTURE = "SUNPOINT_PICTURE"
 """Environment variable: file that gets the picture of the README."""
