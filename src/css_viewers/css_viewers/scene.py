@@ -7,7 +7,7 @@ the angular size that it has from there.
 """
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -178,11 +178,6 @@ def sides_of(inertia: Any) -> np.ndarray:
     squares = np.maximum(moments.sum() - 2.0 * moments, 1e-4 * moments.sum())
     sides = np.sqrt(squares)
     return _LONGEST * sides / sides.max()
-
-
-def groups(shapes: Iterable[Shape]) -> set[str]:
-    """Names of the groups of some shapes."""
-    return {shape.group for shape in shapes}
 
 
 def _arrow(group: str, frame: str, colour: Colour, direction: Vec3) -> Shape:
