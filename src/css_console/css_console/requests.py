@@ -16,7 +16,7 @@ class _Pending(NamedTuple):
     client: Client
     request: Any
     answered: Callable[[Any], None]
-    given_up: Callable[[str], None]
+    given_up: Callable[[str], object]
     limit: float
 
 
@@ -35,7 +35,7 @@ class Requests:
         kind: type,
         request: Any,
         answered: Callable[[Any], None],
-        given_up: Callable[[str], None] = lambda why: None,
+        given_up: Callable[[str], object] = lambda why: None,
     ) -> None:
         """Asks; what comes of it is handed on from `look`.
 
