@@ -30,7 +30,8 @@ _DECLARED = re.compile(r"^declare .*?@(\"[^\"]+\"|[\w.$]+)\(", re.MULTILINE)
 _HOST_ATTRIBUTES = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _DEFINITION = re.compile(r"^(define .*?) \{$", re.MULTILINE)
 _CALLED = re.compile(r"(?:call|invoke) .*?@(\"[^\"]+\"|[\w.$]+)\(")
-_LONG_NAME = re.compile(r"""(%)("[^"]{200,}"|[\w.$-]{200,})()""")
+# or what stands between quotes, to be passed over: a string may end in what looks like the sign of a name
+_LONG_NAME = re.compile(r'(%)("[^"]{200,}"|[\w.$-]{200,})()|"[^"]*"')
 _LONG_LABEL = re.compile(r"""^()("[^"]{200,}"|[\w.$-]{200,})(:)""", re.MULTILINE)
 _WARNED = re.compile(r"stack frame size \((\d+)\) exceeds limit \(\d+\) in function '([^']+)'")
 
@@ -183,6 +184,8 @@ def _with_short_names(text: str, prefix: str) -> str:
     names: dict[str, str] = {}
 
     def short(found: re.Match[str]) -> str:
+        if found[2] is None:
+            return found[0]
         return f"{found[1]}{names.setdefault(found[2], f'{prefix}.{len(names)}')}{found[3]}"
 
     return _LONG_LABEL.sub(short, _LONG_NAME.sub(short, text))

@@ -233,6 +233,17 @@ def test_blocks_with_endless_names_are_not_taken_for_one_another():
     assert found.missing == ["left", "right"]
 
 
+def test_a_string_that_ends_like_the_beginning_of_a_name_stays_what_it_is():
+    """Check sums of what numba leaves of an exception hold any byte."""
+    comment = 60 * "; and "
+    text = (
+        f'@kept = constant [2 x i8] c"\\01%"\n{comment}\n@other = constant [1 x i8] c"x"\n'
+        "define void @f() {\n  ret void\n}\n"
+    )
+    object_ = machine_code("f", [text], ["f", "kept", "other"], TARGETS["x86_64"]).object
+    assert b"\x01%x" in object_
+
+
 def test_names():
     assert identifier("default") == "default_"
     assert identifier("2nd-cell") == "n2nd_cell"
