@@ -136,7 +136,7 @@ def started(monkeypatch):
     happened: list[Any] = []
     monkeypatch.setattr(cli, "find_need", lambda *_: False)
     monkeypatch.setattr(cli, "_replace_process", lambda command, env: noted(happened, command[2:], 0))
-    monkeypatch.setattr(checks, "failing_linters", lambda project, env: noted(happened, "linters", []))
+    monkeypatch.setattr(checks, "failing_linters", lambda project, env, linters: noted(happened, linters, []))
     monkeypatch.chdir(Path.cwd())
     return happened
 
@@ -144,7 +144,7 @@ def started(monkeypatch):
 def test_linters_run_with_all_tests_and_on_request(started):
     assert main(["test"]) == 0
     assert main(["lint"]) == 0
-    assert started == ["linters", ["pytest", *cli.ALL_TESTS], "linters"]
+    assert started == [checks.STYLE, ["pytest", *cli.ALL_TESTS], (*checks.STYLE, checks.TYPES)]
 
 
 def test_named_tests_run_alone(started):

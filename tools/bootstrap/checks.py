@@ -5,17 +5,18 @@ from __future__ import annotations
 
 import subprocess
 import time
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from bootstrap.project import Project
 
-LINTERS = (["ruff", "check"], ["ruff", "format", "--check"], ["mypy"])
+STYLE = (["ruff", "check"], ["ruff", "format", "--check"])
+TYPES = ["mypy"]
 
 
-def failing_linters(project: Project, env: Mapping[str, str]) -> list[str]:
-    """Run ruff and mypy with their output shown; the names of those that complain."""
+def failing_linters(project: Project, env: Mapping[str, str], linters: Iterable[list[str]]) -> list[str]:
+    """Run linters with their output shown; the names of those that complain."""
     failing = []
-    for linter in LINTERS:
+    for linter in linters:
         began = time.monotonic()
         print(f"== {' '.join(linter)}", flush=True)
         if subprocess.call([project.python, "-m", *linter], env=env, cwd=project.root):
