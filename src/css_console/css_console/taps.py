@@ -13,39 +13,15 @@ from typing import Any
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
 
-from css_common.codec import DecodeError, Sample, codec_of, stamp_of
+from css_analysis.flight_topics import LOGGED_TYPES, TOLD_TYPES
+from css_common.codec import DecodeError, Sample, codec_of, stamp_of, type_name
 from css_common.qos import matching_qos
 from css_common.ros_internals import bare_subscription
-from css_msgs.msg import (
-    AttitudeEstimate,
-    ControlStatus,
-    CssVoltages,
-    Faults,
-    Health,
-    RodDipoleCommand,
-    SpacecraftState,
-    SunEstimate,
-    WheelState,
-)
+from css_msgs.msg import SpacecraftState, SunEstimate, WheelTorqueCommand
 
 KEPT = 12
-TYPES = {
-    f"css_msgs/msg/{kind.__name__}": kind
-    for kind in (
-        AttitudeEstimate,
-        ControlStatus,
-        CssVoltages,
-        Faults,
-        Health,
-        RodDipoleCommand,
-        SpacecraftState,
-        SunEstimate,
-        WheelState,
-    )
-}
-"""Types of topics that are watched, by their full name."""
-_TELLING = (Health, Faults)
-"""They come when something changes, and hold until the next one."""
+TYPES = {type_name(kind): kind for kind in (*LOGGED_TYPES.values(), *TOLD_TYPES) if kind is not WheelTorqueCommand}
+"""Types of topics that are watched, by their full name: all of a flight but what the page has no place for."""
 
 
 class Tap:
@@ -70,7 +46,7 @@ class Tap:
     @property
     def tells(self) -> bool:
         """Its messages hold until the next one."""
-        return self.kind in _TELLING
+        return self.kind in TOLD_TYPES
 
     def take(self) -> bool:
         """Takes what has come; whether its time went back meanwhile, as at the start of another flight."""
