@@ -110,8 +110,9 @@ export class Controls {
 
   showPace(pace) {
     this.pace = pace;
-    $("toggle").textContent = pace.paused ? "Go on" : "Pause";
-    if (document.activeElement !== $("speed")) $("speed").value = pace.rate;
+    const text = pace.paused ? "Go on" : "Pause";
+    if ($("toggle").textContent !== text) $("toggle").textContent = text;
+    if (document.activeElement !== $("speed") && $("speed").value !== String(pace.rate)) $("speed").value = pace.rate;
   }
 
   showTime(time) {
