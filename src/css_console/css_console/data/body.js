@@ -1,15 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // The spacecraft with what its cells see: drawn when something has moved by a pixel, not sixty times a second.
 
+import { EARTH_AT, SUN_AT, angleOf, drawnBySoftware, inSight } from "./sight.js";
 import * as THREE from "./three.module.js";
 
-const SUN_AT = 2.6, EARTH_AT = 7.0, CELL_AT = 0.62, VIEW = 0.55;
+const CELL_AT = 0.62, VIEW = 0.55;
 const DRAW_MS = 100;
 const FIELD = (40 * Math.PI) / 180; // of the camera, from bottom to top
-const SHADE = 0.6; // length that a cell counts as from dark to lit
 const SPOKES = Math.PI / 3; // from one spoke of a wheel to the next
 const SOFTWARE_RATIO = 0.75; // pixels for one of the page where a processor draws them
-const SOFTWARE = /swiftshader|llvmpipe|softpipe|software|basic render/i;
 const STEEPEST = (78 * Math.PI) / 180; // half angle of a view beyond which a cone is no picture
 const Z = new THREE.Vector3(0, 0, 1);
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -287,33 +286,6 @@ export class Body {
     const gl = this.renderer.getContext();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
-}
-
-// Whether a processor draws in place of a graphics processor.
-function drawnBySoftware() {
-  const gl = document.createElement("canvas").getContext("webgl2");
-  const info = gl?.getExtension("WEBGL_debug_renderer_info");
-  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
-  gl?.getExtension("WEBGL_lose_context")?.loseContext();
-  return SOFTWARE.test(name);
-}
-
-// Angle by which a wheel is shown turned, at a hundredth of the true rate: of the true one the eye would see nothing.
-function angleOf(rpm, time) {
-  return ((rpm * time * Math.PI) / 30) * 0.01;
-}
-
-// What of an instant the eye sees, as lengths in the scene; lengths that differ by more than a pixel are another picture.
-function inSight(now, view) {
-  const flies = (now.estimates ?? []).find((e) => e.flies) ?? now.estimates?.[0];
-  const scaled = (vector, by) => (vector ?? [9, 9, 9]).map((value) => by * value);
-  return [
-    ...(view === "space" ? scaled(now.q_nb, 2 * SUN_AT) : []),
-    ...scaled(now.sun, SUN_AT), SHADE * (now.sunlit ?? 1),
-    ...scaled(now.earth?.b, EARTH_AT),
-    ...(now.estimates ?? []).flatMap((e) => [...scaled(e.sun, SUN_AT), (SUN_AT * Math.min(e.bound_deg ?? 90, 90) * Math.PI) / 180]),
-    ...(now.cells ?? []).map((value, i) => (value === null || flies?.isolated.includes(i) ? 9 : SHADE * value)),
-  ];
 }
 
 // Edges of a solid block with the ratios of these moments of inertia, the longest 0.8.

@@ -3,7 +3,7 @@
 
 import { Body } from "./body.js";
 import { Charts } from "./charts.js";
-import { Controls } from "./controls.js";
+import { Controls, put } from "./controls.js";
 import { Painter } from "./painter.js";
 import { Line } from "./socket.js";
 
@@ -88,11 +88,6 @@ function numbers(frame) {
   show($("wheels-box"), $("wheels"), now.wheels_rpm, now.control?.wheels_isolated, "rpm");
   show($("rods-box"), $("rods"), now.rods, now.control?.rods_isolated, "");
   list($("verdicts"), now.health.map((v) => `${v.node}: ${v.unit} ${v.kind}, ${v.evidence}, since ${v.since_s.toFixed(1)} s`));
-}
-
-// A text in its place; the same text once more would be laid out again.
-function put(place, text) {
-  if (place.textContent !== text) place.textContent = text;
 }
 
 function show(box, place, values, out, unit) {
