@@ -11,6 +11,7 @@ from flights import fly_composed, messages_by_topic, samples, short_mission
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from css_bringup.flight_pages import write_replay_page
 from css_bringup.replay_bag import mission_of_bag, replay
 from css_bringup.replay_pass import parse_request
 from css_common.codec import codec_of
@@ -20,6 +21,9 @@ from css_recording.bag_metadata import Topic
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
 from css_recording.provenance import software_versions
+from css_report.flight_page import flight_page, read_for_page
+from css_report.html_page import html_of
+from css_report.places import page_of
 
 REFERENCE = Path(__file__).parents[1] / "bags" / "reference"
 
@@ -127,6 +131,20 @@ def test_damaged_messages_are_counted_and_passed_over(flight, tmp_path):
     refused = result.rejected["/css/voltages"]["not_finite"]
     assert refused > 10
     assert result.replayed[0].messages == 600 - refused
+    # its page says so beside what the flight says of itself, and so does one that is made of the recording later
+    assert write_replay_page(result) == page_of(tmp_path / "replay")
+    for page in (page_of(tmp_path / "replay").read_text(), html_of(flight_page(read_for_page(tmp_path / "replay")))):
+        assert "In flight nothing was refused" in page
+        assert "In the replay, as its estimators counted it:" in page
+        assert f"{refused} messages of /css/voltages refused (not_finite)" in page
+        assert "css/voltages: not_finite:" in page
+
+
+def test_a_replay_of_a_whole_flight_says_that_nothing_was_refused(flight, tmp_path):
+    result = _replayed(flight, tmp_path / "replay", "wavg")
+    assert result.incidents == []
+    page = html_of(flight_page(read_for_page(tmp_path / "replay")))
+    assert "In the replay nothing was refused" in page and "In flight nothing was refused" in page
 
 
 def test_reference_recording_gives_the_stored_numbers(tmp_path):

@@ -16,6 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from css_analysis.fault_record import FaultRecord, fault_records
+from css_analysis.flight_topics import (
+    ESTIMATES,
+    LOGGED_TYPES,
+    SINGLE,
+    TOLD_TYPES,
+    TRUE_WHEELS,
+    estimator_of,
+)
 from css_analysis.health_record import HealthRecord, health_records
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Codec, DecodeError, Sample, codec_of, type_name
@@ -26,43 +34,13 @@ from css_common.message_columns import Columns, stack
 from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
 from css_common.vectors import multiply, row
-from css_msgs.msg import (
-    AttitudeEstimate,
-    ControlStatus,
-    CssVoltages,
-    Faults,
-    Health,
-    RodDipoleCommand,
-    SpacecraftState,
-    SunEstimate,
-    WheelState,
-    WheelTorqueCommand,
-)
+from css_msgs.msg import AttitudeEstimate, Faults, Health, SunEstimate, WheelState
 from css_recording.errors import BagError
 from css_recording.provenance import IMPORTED_FROM
 
 SUNLIT_FRACTION = 0.5
 """The flight is sunlit while more than this fraction of the solar disc is in view."""
 
-# Messages of estimators, of which a flight may have several: attribute of the log and end of the topic.
-_ESTIMATES = {SunEstimate: ("estimates", "/sun_estimate"), AttitudeEstimate: ("attitudes", "/attitude")}
-
-# Topics that a flight has once: attribute of the log, type, name in Sunpoint's own recordings.
-_SINGLE = {
-    "truth": (SpacecraftState, "/truth"),
-    "voltages": (CssVoltages, "/css/voltages"),
-    "wheels": (WheelState, "/wheels/state"),
-    "torque_command": (WheelTorqueCommand, "/wheels/torque_command"),
-    "rod_command": (RodDipoleCommand, "/rods/dipole_command"),
-    "control": (ControlStatus, "/control/status"),
-}
-_TRUE_WHEELS = "/truth/wheels"  # beside the reported ones, where tachometers err
-LOGGED_TYPES: dict[str, type] = {
-    f"css_msgs/msg/{kind.__name__}": kind for kind in (*_ESTIMATES, *(kind for kind, _ in _SINGLE.values()))
-}
-"""Messages that a log holds, type name to class."""
-TOLD_TYPES: tuple[type, ...] = (Faults, Health)
-"""Messages about units that fail, sent when something changes."""
 _ARRAY_NORMAL = next(p for p in SPACECRAFT if p.name == "spacecraft.array_normal")
 
 
@@ -127,7 +105,7 @@ class FlightLog:
 
     def columns(self) -> list[Columns]:
         """All columns of the log, none of them empty."""
-        single = [getattr(self, name) for name in _SINGLE]
+        single = [getattr(self, name) for name in SINGLE]
         estimates = [*self.estimates.values(), *self.attitudes.values()]
         return [columns for columns in (*single, *estimates) if columns is not None]
 
@@ -138,14 +116,14 @@ class FlightLog:
         """
         if len(columns) == 0:
             return
-        if message_type in _ESTIMATES:
-            attribute, _ = _ESTIMATES[message_type]
+        if message_type in ESTIMATES:
+            attribute, _ = ESTIMATES[message_type]
             getattr(self, attribute)[estimator_of(topic)] = columns
             return
-        if topic == _TRUE_WHEELS and message_type is WheelState:
+        if topic == TRUE_WHEELS and message_type is WheelState:
             self.true_wheels = columns
             return
-        for attribute, (kind, usual) in _SINGLE.items():
+        for attribute, (kind, usual) in SINGLE.items():
             if kind is not message_type:
                 continue
             taken = getattr(self, attribute) is not None
@@ -347,11 +325,3 @@ def _decodes(codec: Codec, data: bytes) -> bool:
     except DecodeError:
         return False
     return True
-
-
-def estimator_of(topic: str) -> str:
-    """Name of the estimator that publishes a topic: `/ekf/sun_estimate` is of `ekf`."""
-    for _, suffix in _ESTIMATES.values():
-        if topic.endswith(suffix):
-            return topic.removesuffix(suffix).strip("/") or suffix.strip("/")
-    return topic.strip("/")

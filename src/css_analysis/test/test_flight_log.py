@@ -7,7 +7,8 @@ from presence import present
 from scipy.spatial.transform import Rotation
 from synthetic_flight import EPOCH_NS, columns, estimates, record, stamps, tilted, truth
 
-from css_analysis.flight_log import angle, estimator_of, read_flight, to_body
+from css_analysis.flight_log import angle, read_flight, to_body
+from css_analysis.flight_topics import estimator_of
 from css_common.codec import DecodeError, codec_of
 from css_common.message_columns import Columns, columns_of, stack, stack_alike, unstack
 from css_common.mission import load_mission

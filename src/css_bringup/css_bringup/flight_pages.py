@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages that flights, demonstrations and replays end with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,7 +46,8 @@ def write_demo_page(log: FlightLog, runs: Sequence[Run], bag: Path, replayed: Re
     others = {run.label for run in replayed.replayed if run.comparison is None}
     estimates = {name: columns for name, columns in replayed.log.estimates.items() if name in others}
     both = replace(log, estimates=log.estimates | estimates)
-    return _write("demo", both, runs, bag, faults_flown(log, bag), replay_remarks(replayed))
+    remarks = [*(f"replay: {line}" for line in replayed.incidents), *replay_remarks(replayed)]
+    return _write("demo", both, runs, bag, faults_flown(log, bag), remarks)
 
 
 def write_replay_page(result: ReplayResult) -> Path | None:
@@ -69,17 +70,10 @@ def _write(
 
 
 def replay_remarks(result: ReplayResult) -> list[str]:
-    """What a replay refused, took for missing or could not compare, one line each."""
-    lines = [f"replay: {line}" for line in result.reports]
-    lines += _counted("messages of {} refused", result.rejected)
-    lines += _counted("readings of {} that counted as missing", result.missing)
+    """What is to be known of a replay besides its incidents, which its recording tells, one line each."""
+    lines = [f"replay: {line}" for line in result.reports if line not in result.incidents]
     for run in result.replayed:
-        lines += [f"replay, {run.label}: {line}" for line in (*run.notes, *run.matcher.complaints())]
+        lines += [f"replay, {run.label}: {line}" for line in run.notes]
         if run.comparison is not None:
             lines.append(f"replay, {run.label}: {run.comparison.text()}")
     return [*lines, *(f"not as it should be: {line}" for line in result.shortcomings)]
-
-
-def _counted(what: str, counts: Mapping[str, Mapping[str, int]]) -> list[str]:
-    told = ((topic, ", ".join(f"{count} {kind}" for kind, count in kinds.items())) for topic, kinds in counts.items())
-    return [f"replay: {what.format(topic)}: {kinds}" for topic, kinds in told]

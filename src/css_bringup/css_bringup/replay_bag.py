@@ -11,6 +11,7 @@ from typing import Any
 from css_analysis.estimator_runs import Run, estimator_runs
 from css_analysis.flight_log import FlightLog, read_flight
 from css_bringup.estimator_request import EstimatorRequest
+from css_bringup.replay_incidents import replay_incidents
 from css_bringup.replay_pass import Replay
 from css_bringup.replay_verdict import shortcomings, software_apart
 from css_bringup.replayed import Replayed
@@ -19,7 +20,7 @@ from css_common.mission import Mission, MissionError, load_mission, mission_from
 from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
-from css_recording.provenance import IMPORTED_FROM, software_versions
+from css_recording.provenance import IMPORTED_FROM, INCIDENTS, NOTHING, REPLAY_INCIDENTS, software_versions
 
 
 @dataclass
@@ -36,6 +37,7 @@ class ReplayResult:
         rejected: messages refused at the edge, by topic and kind.
         missing: readings that counted as missing, by topic, field and kind.
         reports: what is to be known of the recording, and one line for each kind of refusal.
+        incidents: what was refused, missed or failed, how many and why, as the new recording tells it.
         elsewhere: what differs between the software of the flight and this one; empty: nothing.
         simulated_s: time from the first to the last stamp that was replayed [s].
         wall_s: wall time of reading and stepping [s].
@@ -51,6 +53,7 @@ class ReplayResult:
     rejected: Mapping[str, Mapping[str, int]]
     missing: Mapping[str, Mapping[str, int]]
     reports: list[str]
+    incidents: list[str]
     elsewhere: str
     simulated_s: float
     wall_s: float
@@ -83,6 +86,7 @@ class ReplayResult:
             "software_differs": self.elsewhere or None,
             "replayed": [_replayed_object(run) for run in self.replayed],
             "shortcomings": self.shortcomings,
+            "incidents": self.incidents,
             "rejected": {topic: dict(kinds) for topic, kinds in self.rejected.items()},
             "missing_readings": {topic: dict(kinds) for topic, kinds in self.missing.items()},
         }
@@ -149,9 +153,14 @@ def replay(
         wall = time.perf_counter()
         with BagWriter(bag, metadata=metadata, overwrite=overwrite) as writer:
             cpu_s = stepping.run(writer)
+            damaged = [*map(str, reader.refused)]
+            incidents = [*damaged, *replay_incidents(stepping)]
+            notes = {REPLAY_INCIDENTS: "\n".join(incidents) or NOTHING}
+            if INCIDENTS in reader.description:
+                notes[INCIDENTS] = reader.description[INCIDENTS]
+            writer.close(notes)
         wall_s = time.perf_counter() - wall
         elsewhere = software_apart(reader.description)
-        notes = [*reader.notes, *map(str, reader.refused)]
     log = read_flight(bag)
     runs = [_named(run, figures) for run, figures in _paired(stepping.runs, log)]
     return ReplayResult(
@@ -163,7 +172,8 @@ def replay(
         runs,
         stepping.rejected,
         stepping.missing,
-        notes + stepping.reports,
+        [*reader.notes, *damaged, *stepping.reports],
+        incidents,
         elsewhere,
         (stepping.last_ns - stepping.first_ns) * 1e-9,
         wall_s,

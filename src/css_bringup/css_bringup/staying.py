@@ -3,6 +3,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 from rclpy.context import Context
 from rclpy.parameter import Parameter
@@ -20,6 +21,20 @@ from css_common.preflight import preflight, report
 from css_common.stop_signal import StopSignal
 
 
+class Staying(NamedTuple):
+    """What flights one after another have in common.
+
+    Attributes:
+        bag_of: where a flight is recorded; None: nowhere.
+        console: where progress is shown, when it is a terminal.
+        conclude: says what came of a flight that was not ended for another one, and gives its exit code.
+    """
+
+    bag_of: Callable[[Mission], Path | None]
+    console: Console
+    conclude: Callable[[Mission, FlightResult], int]
+
+
 def mission_of_wish(wish: Wish) -> Mission:
     """The mission that a wish means, checked as before a flight.
 
@@ -31,22 +46,13 @@ def mission_of_wish(wish: Wish) -> Mission:
     return mission
 
 
-def fly_and_stay(
-    wish: Wish,
-    mission: Mission,
-    bag_of: Callable[[Mission], Path | None],
-    console: Console,
-    conclude: Callable[[Mission, FlightResult], int],
-    rate: float | None = None,
-) -> int:
+def fly_and_stay(wish: Wish, mission: Mission, staying: Staying, rate: float | None = None) -> int:
     """Flies, and flies again when asked, until Ctrl-C or SIGTERM; the exit code of the last flight.
 
     Args:
         wish: what flies first.
         mission: the same.
-        bag_of: where a flight is recorded; None: nowhere.
-        console: where progress is shown, when it is a terminal.
-        conclude: says what came of a flight that was not ended for another one, and gives its exit code.
+        staying: what it has in common with those that follow.
         rate: simulated seconds per second of the wall clock at first, a later flight has that of the one before it;
             None: as the mission says.
 
@@ -57,18 +63,12 @@ def fly_and_stay(
         asked: tuple[Wish, Mission] | None = (wish, mission)
         code = 0
         while asked is not None:
-            code, asked, rate = _fly_once(*asked, bag_of, console, conclude, stop, rate)
+            code, asked, rate = _fly_once(*asked, staying, stop, rate)
         return code
 
 
 def _fly_once(
-    wish: Wish,
-    mission: Mission,
-    bag_of: Callable[[Mission], Path | None],
-    console: Console,
-    conclude: Callable[[Mission, FlightResult], int],
-    stop: StopSignal,
-    rate: float | None,
+    wish: Wish, mission: Mission, staying: Staying, stop: StopSignal, rate: float | None
 ) -> tuple[int, tuple[Wish, Mission] | None, float]:
     """One flight and the wait after it; its exit code, what is asked for next (None: nothing more), and its rate."""
     warnings = preflight(mission)
@@ -79,14 +79,14 @@ def _fly_once(
         directors.append(FlightDirector(context, wish, mission, mission_of_wish))
         return directors[0]
 
-    with ComposedFlight(mission, bag_of(mission), guests=(direct,)) as flight:
+    with ComposedFlight(mission, staying.bag_of(mission), guests=(direct,)) as flight:
         (director,) = directors
         pace = flight.plant.pace
         if rate is not None:
             flight.plant.set_parameters([Parameter("rate", value=rate)])
         if wish.paused:
             pace.pause()
-        result = with_progress(mission, flight, console, lambda: stop.came or director.asked is not None)
+        result = with_progress(mission, flight, staying.console, lambda: stop.came or director.asked is not None)
         result.warnings = warnings
         director.ended(result)
         if director.asked is not None:
@@ -94,9 +94,9 @@ def _fly_once(
             print_incidents(result)
             code = 0
         else:
-            code = conclude(mission, result)
+            code = staying.conclude(mission, result)
             spin_until(flight.executor, lambda: stop.came or director.asked is not None, context=flight.context)
         asked = None if stop.came else director.asked
     if asked is not None:
-        console.print(f"flies again: {asked[1].name}, case {asked[1].values.mission.case}", soft_wrap=True)
+        staying.console.print(f"flies again: {asked[1].name}, case {asked[1].values.mission.case}", soft_wrap=True)
     return code, asked, pace.rate

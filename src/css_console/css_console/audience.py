@@ -7,7 +7,7 @@ each kind, whatever the flight does meanwhile, and sees the present when it goes
 
 import asyncio
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 _ANSWERS = 64
 REPLACED = ("scene", "history", "frame", "nodes", "log")
@@ -62,19 +62,18 @@ class Audience:
 
     def __init__(self) -> None:
         self.spectators: set[Spectator] = set()
-        self._last: dict[str, str] = {}
 
     def __len__(self) -> int:
         return len(self.spectators)
 
-    def enter(self, spectator: Spectator, fresh: Iterable[tuple[str, str]] = ()) -> None:
-        """One more, who is given the state as it is.
+    def enter(self, spectator: Spectator, state: Iterable[tuple[str, str]] = ()) -> None:
+        """One more.
 
         Args:
             spectator: who comes.
-            fresh: kinds and messages that are made for those who come, in the place of the last ones.
+            state: kinds and messages that say what there is now.
         """
-        for kind, text in (self._last | dict(fresh)).items():
+        for kind, text in state:
             spectator.give(kind, text)
         self.spectators.add(spectator)
 
@@ -82,8 +81,8 @@ class Audience:
         """One less."""
         self.spectators.discard(spectator)
 
-    def show(self, kind: str, text: str) -> None:
-        """A message for all, and for those who come later."""
-        self._last[kind] = text
+    def show(self, kind: str, text: Callable[[], str]) -> None:
+        """A message for all, which is made if there is anybody."""
+        made = text() if self.spectators else ""
         for spectator in self.spectators:
-            spectator.give(kind, text)
+            spectator.give(kind, made)

@@ -9,6 +9,7 @@ import numpy as np
 
 from css_analysis.estimate_errors import heading_sigma_of
 from css_analysis.flight_series import MODES, RPM
+from css_analysis.flight_topics import SINGLE, estimator_of
 from css_common.attitude import dcm_to_quaternion, mrp_to_dcm
 from css_common.codec import Sample
 from css_common.earth import EARTH_RADIUS
@@ -28,6 +29,7 @@ from css_msgs.msg import (
 )
 
 _SIGMAS = 3.0
+_USUAL = dict(SINGLE.values())
 Samples = Mapping[str, tuple[Any, Sample]]
 """Class and message by topic."""
 
@@ -85,7 +87,7 @@ def frame_of(samples: Samples, stamp_ns: int, begin_ns: int, craft: Spacecraft) 
         _estimate(topic, sample, sun, truth, craft, chart) for topic, sample in _all(samples, SunEstimate)
     ]
     shown["attitudes"] = [
-        {"name": _owner(topic), "validity": _VALIDITIES.get(sample.validity, "?")}
+        {"name": estimator_of(topic), "validity": _VALIDITIES.get(sample.validity, "?")}
         for topic, sample in _all(samples, AttitudeEstimate)
     ]
     if sun is not None and craft.array_normal is not None:
@@ -117,12 +119,9 @@ def _all(samples: Samples, kind: type) -> Iterable[tuple[str, Sample]]:
 
 
 def _first(samples: Samples, kind: type) -> Sample | None:
-    return next((sample for _, sample in _all(samples, kind)), None)
-
-
-def _owner(topic: str) -> str:
-    """Name of an estimator by its topic, `/ekf/sun_estimate`."""
-    return topic.strip("/").rpartition("/")[0] or topic.strip("/")
+    """Of several topics of a type that a flight has once, that under Sunpoint's own name, else the first."""
+    found = dict(_all(samples, kind))
+    return found.get(_USUAL[kind], next(iter(found.values()), None))
 
 
 def _listed(values: Iterable[float]) -> list[float]:
@@ -161,7 +160,7 @@ def _estimate(
     craft: Spacecraft,
     chart: _Charts,
 ) -> dict[str, Any]:
-    name = _owner(topic)
+    name = estimator_of(topic)
     known = sample.validity != SunEstimate.VALIDITY_NONE and float(np.linalg.norm(sample.sun_b)) > 0.5
     sun_hat = vector_of(sample.sun_b)
     bound = error = None

@@ -75,19 +75,18 @@ class Stage:
         versions = (watcher.version, watcher.parameters.version)
         if versions != self._versions:
             self._versions = versions
-            self.audience.show("scene", self._scene())
+            self.audience.show("scene", self._scene)
         if watcher.flights != self._flights:
             self._flights = watcher.flights
-            self.audience.show("history", self._history())
+            self.audience.show("history", self._history)
         if fresh:
             self._frames += 1
         now = time.monotonic()
         if fresh or now - self._told_nodes > _NODES_EVERY_S:
-            self.audience.show("frame", self._frame())
+            self.audience.show("frame", self._frame)
         if now - self._told_nodes > _NODES_EVERY_S:
             self._told_nodes = now
-            told = {"nodes": watcher.nodes(), "director": watcher.director(), "browsers": len(self.audience)}
-            self.audience.show("nodes", _message("nodes", told))
+            self.audience.show("nodes", self._nodes)
 
     @property
     def _is_ready(self) -> bool:
@@ -97,8 +96,14 @@ class Stage:
 
     def welcome(self, spectator: Spectator) -> None:
         """Shows the state as it is to one who comes."""
-        fresh = [("scene", self._scene()), ("history", self._history()), ("log", self._shown_log())]
-        self.audience.enter(spectator, fresh)
+        made = {
+            "scene": self._scene,
+            "history": self._history,
+            "frame": self._frame,
+            "nodes": self._nodes,
+            "log": self._shown_log,
+        }
+        self.audience.enter(spectator, ((kind, text()) for kind, text in made.items()))
 
     def take(self, spectator: Spectator, text: str) -> None:
         """Does what a browser orders, and answers it."""
@@ -127,7 +132,7 @@ class Stage:
         self._waiting -= 1
         spectator.answer(_answer(order.number, good, text, commands))
         self._log.append({"commands": commands, "good": good, "message": text})
-        self.audience.show("log", self._shown_log())
+        self.audience.show("log", self._shown_log)
 
     def _frame(self) -> str:
         frame, watcher = self._watcher.frame, self._watcher
@@ -140,6 +145,11 @@ class Stage:
         if frame is not None:
             told |= {"now": frame.shown, "row": [None if value != value else value for value in frame.row]}
         return _message("frame", told)
+
+    def _nodes(self) -> str:
+        watcher = self._watcher
+        told = {"nodes": watcher.nodes(), "director": watcher.director(), "browsers": len(self.audience)}
+        return _message("nodes", told)
 
     def _history(self) -> str:
         return _message("history", {"series": self._watcher.series, "columns": self._watcher.columns()})

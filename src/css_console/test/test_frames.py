@@ -114,3 +114,9 @@ def test_faults_and_verdicts_are_said_in_words():
     (verdict,) = now["health"]
     assert (verdict["node"], verdict["unit"], verdict["kind"], verdict["since_s"]) == ("ekf", "cell.3", "dead", 13.0)
     assert "nothing" in verdict["evidence"]
+
+
+def test_of_wheels_what_they_report_is_shown_not_what_is_true():
+    true, reported = (sample(WheelState, speed=np.full(3, speed)) for speed in (10.0, 20.0))
+    now = shown(truth__wheels=true, wheels__state=reported).shown
+    assert now["wheels_rpm"] == pytest.approx([20.0 * 30.0 / math.pi] * 3)

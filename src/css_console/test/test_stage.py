@@ -3,6 +3,7 @@
 
 import asyncio
 import json
+from functools import partial
 
 import pytest
 
@@ -26,19 +27,26 @@ def test_the_latest_of_a_kind_takes_the_place_of_the_last():
         audience, spectator = Audience(), Spectator()
         audience.enter(spectator)
         for k in range(1000):
-            audience.show("frame", str(k))
-            audience.show("nodes", f"n{k}")
+            audience.show("frame", partial(str, k))
+            audience.show("nodes", partial("n{}".format, k))
         assert spectator.waiting == 2
         assert await spectator.next() == ["999", "n999"]
         assert spectator.replaced == 1998
         late = Spectator()
-        audience.enter(late)
-        assert await late.next() == ["999", "n999"]
+        audience.enter(late, [("frame", "999")])
+        assert await late.next() == ["999"]
         audience.leave(spectator)
-        audience.show("frame", "1000")
+        audience.show("frame", lambda: "1000")
         assert spectator.waiting == 0 and await late.next() == ["1000"]
 
     asyncio.run(main())
+
+
+def test_nothing_is_made_while_nobody_watches():
+    def made():
+        raise AssertionError("nobody sees it")
+
+    Audience().show("frame", made)
 
 
 def test_answers_are_kept_in_order_but_not_without_end():

@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scripts of `./sunpoint completion` complete in the shells themselves."""
 
+import contextlib
 import os
+import pty
+import re
 import shutil
 import subprocess
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
@@ -63,3 +67,49 @@ def test_bash_completes(scripts, words, expected, tmp_path):
         capture_output=True, text=True, check=True, cwd=tmp_path, timeout=60,
     )  # fmt: skip
     assert set(done.stdout.split()) == expected
+
+
+_ZSHRC = """
+fpath=("$ZDOTDIR" $fpath)
+autoload -Uz compinit
+compinit -u -d "$ZDOTDIR/dump"
+PS1= RPS1=
+tell() { print -r -- "<$BUFFER>"; BUFFER= }
+zle -N tell
+bindkey '^I' expand-or-complete
+bindkey '^T' tell
+"""
+
+
+@pytest.mark.skipif(shutil.which("zsh") is None, reason="no zsh on this machine")
+def test_zsh_completes(scripts, tmp_path):
+    shutil.copy(scripts / "zsh", tmp_path / "_sunpoint")
+    (tmp_path / ".zshrc").write_text(_ZSHRC)
+    (tmp_path / "flown.mcap").touch()
+    typed = {
+        "./sunpoint mon": "./sunpoint monte-carlo ",
+        "sunpoint fly okeefe_20": "sunpoint fly okeefe_2013 ",
+        "sunpoint fly --real": "sunpoint fly --realtime ",
+        "sunpoint monte-carlo okeefe_2013 --gyro of": "sunpoint monte-carlo okeefe_2013 --gyro off ",
+        "sunpoint completion z": "sunpoint completion zsh ",
+        "sunpoint replay flo": "sunpoint replay flown.mcap ",
+    }
+    assert typed_into_zsh(tmp_path, typed) == list(typed.values())
+
+
+def typed_into_zsh(home: Path, lines: Iterable[str]) -> list[str]:
+    """What becomes of each line in a zsh at a terminal when tab is pressed at its end."""
+    env = {**os.environ, "ZDOTDIR": str(home), "HOME": str(home), "TERM": "dumb"}
+    child, terminal = pty.fork()
+    if child == 0:
+        os.chdir(home)
+        os.execvpe("zsh", ["zsh", "-i"], env)
+    keys = "".join(f"{line}\t\x14" for line in lines) + "exit\n"
+    os.write(terminal, keys.encode())
+    told = b""
+    with contextlib.suppress(OSError):  # the terminal of one that has ended
+        while chunk := os.read(terminal, 4096):
+            told += chunk
+    os.close(terminal)
+    os.waitpid(child, 0)
+    return [found.decode() for found in re.findall(rb"<([^<>]*)>", told)]

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from css_analysis.flight_log import LOGGED_TYPES, TOLD_TYPES, FlightLog
+from css_analysis.flight_log import FlightLog
+from css_analysis.flight_topics import LOGGED_TYPES, TOLD_TYPES
 from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
 from css_common.link_kinds import MESSAGES_FAIL, SORTS

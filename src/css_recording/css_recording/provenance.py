@@ -15,6 +15,12 @@ _LOCK_FILE = "requirements.lock"
 IMPORTED_FROM = "imported_from"
 """Entry of a recording that was made of a table of telemetry: JSON with its file, hash and known parts of the truth."""
 
+INCIDENTS = "incidents"
+"""Entry with what was not as it should be in a flight, a line each; `NOTHING`: nothing was."""
+REPLAY_INCIDENTS = "replay_incidents"
+"""The same of the replay that made a recording."""
+NOTHING = "none"
+
 SEAL = "sha256"
 """Entry that holds the check sums of those beside it."""
 

@@ -34,14 +34,13 @@ from css_recording.bag_metadata import Topic, absolute
 from css_recording.errors import BagError
 from css_recording.flight_pacing import FlightPacing
 from css_recording.flight_recorder import FlightRecorder, Gap
-from css_recording.provenance import software_versions
+from css_recording.provenance import INCIDENTS, NOTHING, software_versions
 from css_recording.recording_choice import RecordingChoice
 from css_recording.ros_topics import message_class_of, recorded_qos
 from css_recording.second_buffer import SECOND_NS, BufferLimits
 from css_recording.split_bag_writer import SplitBagWriter
 
 PARAMETER_EVENTS = "/parameter_events"
-_INCIDENTS = "incidents"
 """Entry of a recording that says what was not as it should be in the flight, one a line, or `none`."""
 _MEANING = {
     "repeated": "with the stamp of the one before",
@@ -184,7 +183,7 @@ class RecorderNode(Node):
             incidents: what was not as it should be in the flight, beside the recorder's own faults; None when nobody
                 knows.
         """
-        notes = None if incidents is None else {_INCIDENTS: "\n".join((*incidents, *self.faults())) or "none"}
+        notes = None if incidents is None else {INCIDENTS: "\n".join((*incidents, *self.faults())) or NOTHING}
         self._guarded(partial(self._recorder.close, notes))
 
     def stop_listening(self) -> None:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 from css_analysis.flight_log import FlightLog
 from css_recording.bag_reader import BagReader
+from css_recording.provenance import INCIDENTS, NOTHING, REPLAY_INCIDENTS
 from css_report.blocks import Block, Listing, Table
 
-_INCIDENTS, _MISSION = "incidents", "mission"
-_NONE = "none"
+_TOLD_ELSEWHERE = (INCIDENTS, REPLAY_INCIDENTS, "mission")
 
 
 class Provenance(NamedTuple):
@@ -37,21 +37,26 @@ def provenance_of(bag: Path) -> Provenance:
 
 
 def edge_blocks(log: FlightLog, provenance: Provenance, remarks: Sequence[str]) -> Iterator[Block]:
-    """What was not as it should be: as the recorder wrote it, as reading it showed, as the caller knows.
+    """What was not as it should be: as recorder and replay wrote it, as reading it showed, as the caller knows.
 
     Args:
         log: the flight.
         provenance: of its recording.
         remarks: further lines.
     """
-    noted = provenance.description.get(_INCIDENTS)
+    noted, replayed = (provenance.description.get(key) for key in (INCIDENTS, REPLAY_INCIDENTS))
     if noted is None:
         yield "The recording does not say what nodes refused, withheld or missed in flight."
-    elif noted.strip() == _NONE:
+    elif noted.strip() == NOTHING:
         yield "In flight nothing was refused, withheld, lost or missed: no node counted anything of the kind."
     else:
         yield "In flight, as nodes and recorder counted it:"
         yield Listing(noted.splitlines())
+    if replayed is not None and replayed.strip() == NOTHING:
+        yield "In the replay nothing was refused, withheld or missed: no estimator counted anything of the kind."
+    elif replayed is not None:
+        yield "In the replay, as its estimators counted it:"
+        yield Listing(replayed.splitlines())
     lines = [*log.notes, *remarks]
     if lines:
         yield "In reading the recording, and beside it:"
@@ -62,7 +67,7 @@ def edge_blocks(log: FlightLog, provenance: Provenance, remarks: Sequence[str]) 
 
 def version_table(provenance: Provenance) -> Table:
     """What made a recording."""
-    told = {key: value for key, value in provenance.description.items() if key not in (_INCIDENTS, _MISSION)}
+    told = {key: value for key, value in provenance.description.items() if key not in _TOLD_ELSEWHERE}
     return Table(("what flew it", "version"), [[key, value] for key, value in sorted(told.items())])
 
 

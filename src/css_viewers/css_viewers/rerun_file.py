@@ -16,8 +16,8 @@ _TIMELINE = "flight"
 _INSTALL = "./sunpoint shell -c 'uv pip install -r requirements-rerun.lock'"
 
 
-def write_rerun(viewed: ViewedBag, file: Path) -> dict[str, Any]:
-    """Writes the file; its name, messages drawn and seconds of flight.
+def write_rerun(viewed: ViewedBag, file: Path) -> None:
+    """Writes the file.
 
     Raises:
         ViewerError: Rerun is not installed, or the file cannot be written.
@@ -33,7 +33,7 @@ def write_rerun(viewed: ViewedBag, file: Path) -> dict[str, Any]:
     stream = rerun.RecordingStream(_APPLICATION, recording_id=viewed.mission.name)
     try:
         stream.save(unfinished)
-        told = _draw(rerun, stream, viewed)
+        _draw(rerun, stream, viewed)
         stream.flush()
         stream.disconnect()
         unfinished.replace(file)
@@ -41,12 +41,10 @@ def write_rerun(viewed: ViewedBag, file: Path) -> dict[str, Any]:
         raise ViewerError(f"--rerun {file}: cannot be written: {error}") from error
     finally:
         unfinished.unlink(missing_ok=True)
-    return {"file": str(file), **told}
 
 
-def _draw(rerun: Any, stream: Any, viewed: ViewedBag) -> dict[str, Any]:
+def _draw(rerun: Any, stream: Any, viewed: ViewedBag) -> None:
     drawing = _Drawing(rerun, stream)
-    count, first_ns, last_ns = 0, 0, 0
     for drawn in viewed.messages():
         stream.set_time(_TIMELINE, timestamp=np.datetime64(drawn.stamp_ns, "ns"))
         message: Any = plain_types().deserialize_cdr(drawn.data, drawn.type_name)
@@ -54,8 +52,6 @@ def _draw(rerun: Any, stream: Any, viewed: ViewedBag) -> dict[str, Any]:
             drawing.turn(message.transforms)
         elif drawn.type_name.endswith("/MarkerArray"):
             drawing.draw(message.markers)
-        count, first_ns, last_ns = count + 1, first_ns or drawn.stamp_ns, drawn.stamp_ns
-    return {"messages": count, "seconds": (last_ns - first_ns) / 1e9}
 
 
 class _Drawing:

@@ -52,6 +52,7 @@ class ViewedBag:
         topics: absolute name to type name of what is drawn.
         absent: topics of the flight that would be drawn and are not in the recording.
         reports: one line for each kind of message that was refused.
+        drawn: messages so far.
     """
 
     def __init__(self, reader: BagReader, mission: Mission, every: int) -> None:
@@ -68,6 +69,8 @@ class ViewedBag:
         """
         self.mission = mission
         self.reports: list[str] = []
+        self.drawn = 0
+        self._first_ns = self._last_ns = 0
         self._reader = reader
         node = mission.with_node((PACKAGE, NODE, NODE), {DIVIDER.name: str(every)}).node(NODE)
         self._stepper = Stepper(OfflineScene, NODE, node.canonical, (), mission.epoch_ns)
@@ -93,12 +96,23 @@ class ViewedBag:
         """Messages that were refused at the edge so far."""
         return sum(edge.rejected.total() for edge in self._edges.values())
 
+    @property
+    def seconds(self) -> float:
+        """Time [s] from the first message drawn so far to the last one."""
+        return (self._last_ns - self._first_ns) / 1e9
+
     def messages(self) -> Iterator[Drawn]:
         """Reads the recording once.
 
         Raises:
             BagError: it cannot be read to its end.
         """
+        for drawn in self._messages():
+            self.drawn += 1
+            self._first_ns, self._last_ns = self._first_ns or drawn.stamp_ns, drawn.stamp_ns
+            yield drawn
+
+    def _messages(self) -> Iterator[Drawn]:
         for message in self._reader.messages(set(self._edges)):
             edge = self._edges[message.topic]
             sample = edge.accept(message.data)

@@ -19,7 +19,7 @@ from css_bringup.options import complain, console, errors
 from css_bringup.processes import RECORDER
 from css_bringup.report import flight_object, print_incidents, print_json, print_result, unmet
 from css_bringup.stand_ins import stand_ins
-from css_bringup.staying import fly_and_stay
+from css_bringup.staying import Staying, fly_and_stay
 from css_common import security
 from css_common.command import FAILED, INTERRUPTED
 from css_common.mission import Mission
@@ -61,7 +61,8 @@ def _stay(arguments: argparse.Namespace, mission: Mission, domain: int) -> int:
         return conclude(flown, result, as_json=arguments.json, with_page=arguments.report)
 
     wish = Wish(arguments.mission, tuple(overrides_of(arguments)), arguments.paused)
-    return fly_and_stay(wish, mission, (lambda _: None) if arguments.no_record else default_bag, console, end)
+    bag_of = (lambda _: None) if arguments.no_record else default_bag
+    return fly_and_stay(wish, mission, Staying(bag_of, console, end))
 
 
 def conclude(

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// The spacecraft with what its cells see: drawn when there is something new, not sixty times a second.
+// The spacecraft with what its cells see: drawn when something has moved by a pixel, not sixty times a second.
 
+import { EARTH_AT, SUN_AT, angleOf, drawnBySoftware, inSight } from "./sight.js";
 import * as THREE from "./three.module.js";
 
-const SUN_AT = 2.6, EARTH_AT = 7.0, CELL_AT = 0.62, VIEW = 0.55;
+const CELL_AT = 0.62, VIEW = 0.55;
+const DRAW_MS = 100;
+const FIELD = (40 * Math.PI) / 180; // of the camera, from bottom to top
+const SPOKES = Math.PI / 3; // from one spoke of a wheel to the next
+const SOFTWARE_RATIO = 0.75; // pixels for one of the page where a processor draws them
 const STEEPEST = (78 * Math.PI) / 180; // half angle of a view beyond which a cone is no picture
 const Z = new THREE.Vector3(0, 0, 1);
 const dark = matchMedia("(prefers-color-scheme: dark)");
@@ -14,10 +19,11 @@ const turned = (to) => new THREE.Quaternion().setFromUnitVectors(Z, to.clone().n
 const rows = (flat) => Array.from({ length: Math.floor((flat ?? []).length / 3) }, (_, i) => flat.slice(3 * i, 3 * i + 3));
 
 export class Body {
-  constructor(canvas, complaint) {
+  constructor(canvas, complaint, painter) {
     this.canvas = canvas;
+    this.software = drawnBySoftware();
     try {
-      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true });
+      this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !this.software, alpha: true });
     } catch {
       canvas.hidden = true;
       complaint.hidden = false;
@@ -25,7 +31,7 @@ export class Body {
       return;
     }
     this.scene = new THREE.Scene();
-    this.camera = new THREE.PerspectiveCamera(40, 1, 0.1, 60);
+    this.camera = new THREE.PerspectiveCamera((FIELD * 180) / Math.PI, 1, 0.1, 60);
     this.azimuth = -0.9;
     this.height = 0.45;
     this.distance = 6.4;
@@ -36,9 +42,15 @@ export class Body {
     this.light = new THREE.DirectionalLight(0xffffff, 2.4);
     this.scene.add(this.light);
     this.craft = {};
+    this.stale = painter.part(() => this.draw(), DRAW_MS);
+    this.inView = true;
     this.build();
-    dark.addEventListener("change", () => { this.build(); this.show(this.now); });
-    new ResizeObserver(() => this.draw()).observe(canvas);
+    dark.addEventListener("change", () => this.build());
+    new ResizeObserver(() => this.stale(true)).observe(canvas);
+    new IntersectionObserver(([entry]) => {
+      this.inView = entry.isIntersecting;
+      if (this.inView) this.stale();
+    }).observe(canvas);
     this.listen();
   }
 
@@ -63,12 +75,12 @@ export class Body {
   turn(across, up) {
     this.azimuth += across;
     this.height = Math.min(1.5, Math.max(-1.5, this.height + up));
-    this.draw();
+    this.stale(true);
   }
 
   zoom(by) {
     this.distance = Math.min(20, Math.max(3, this.distance * by));
-    this.draw();
+    this.stale(true);
   }
 
   // The spacecraft itself, from its parameters.
@@ -76,7 +88,14 @@ export class Body {
     if (!this.renderer || JSON.stringify(craft) === JSON.stringify(this.craft)) return;
     this.craft = craft;
     this.build();
-    this.show(this.now);
+  }
+
+  // From where it is seen: `space` or `body`.
+  seeFrom(view) {
+    this.view = view;
+    if (!this.renderer) return;
+    this.seen = null;
+    this.stale(true);
   }
 
   build() {
@@ -94,6 +113,9 @@ export class Body {
     this.earth = new THREE.Mesh(new THREE.SphereGeometry(1, 40, 24), new THREE.MeshLambertMaterial({ color: colour("--earth") }));
     this.sky.add(this.earth);
     this.earth.visible = false;
+    this.shades = [colour("--rule"), colour("--lit"), colour("--bad")];
+    this.seen = null;
+    this.stale(true);
   }
 
   arrays(normal, reach) {
@@ -122,7 +144,7 @@ export class Body {
     const open = new THREE.ConeGeometry(length * Math.tan(half), length, 28, 1, true);
     open.translate(0, -length / 2, 0);
     open.rotateX(-Math.PI / 2); // its tip at the cell, open towards +z
-    const skin = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.08, side: THREE.DoubleSide, depthWrite: false });
+    const skin = new THREE.MeshBasicMaterial({ transparent: true, opacity: 0.08, side: THREE.DoubleSide, depthWrite: false, forceSinglePass: true });
     const dot = new THREE.Mesh(new THREE.CylinderGeometry(0.06, 0.06, 0.03, 20).rotateX(Math.PI / 2), new THREE.MeshBasicMaterial());
     cone.add(new THREE.Mesh(open, skin), dot, sprite(String(i)));
     cone.children[2].position.z = 0.12;
@@ -163,7 +185,7 @@ export class Body {
     if (!this.estimates.has(name)) {
       const arrow = this.arrow("--estimate", true);
       const cone = new THREE.Mesh(new THREE.ConeGeometry(1, 1, 40, 1, true).translate(0, -0.5, 0).rotateX(-Math.PI / 2),
-        new THREE.MeshBasicMaterial({ color: colour("--estimate"), transparent: true, opacity: 0.28, side: THREE.DoubleSide, depthWrite: false }));
+        new THREE.MeshBasicMaterial({ color: colour("--estimate"), transparent: true, opacity: 0.28, side: THREE.DoubleSide, depthWrite: false, forceSinglePass: true }));
       arrow.add(cone);
       this.estimates.set(name, { arrow, cone });
     }
@@ -172,23 +194,36 @@ export class Body {
 
   show(now) {
     this.now = now;
-    if (!this.renderer) return;
-    if (now) {
-      const attitude = new THREE.Quaternion();
-      if (now.q_nb && this.view === "space") attitude.set(...now.q_nb);
-      this.group.quaternion.copy(attitude);
-      this.sky.quaternion.copy(attitude);
-      this.showSun(now, attitude);
-      this.showCells(now);
-      (now.wheels_rpm ?? []).forEach((rpm, i) => this.spin(i, rpm, now.time));
-    }
-    this.draw();
+    if (this.renderer && this.inView && this.moved(now)) this.stale();
+  }
+
+  // Whether anything is a pixel away from where it was drawn.
+  moved(now) {
+    const seen = inSight(now, this.view);
+    const pixel = (2 * this.distance * Math.tan(FIELD / 2)) / Math.max(this.canvas.clientHeight, 1);
+    if (this.seen?.length !== seen.length || seen.some((value, i) => Math.abs(value - this.seen[i]) > pixel)) return true;
+    // a wheel that turns on by more than half a spoke looks as if it stood still or turned back
+    return (now.wheels_rpm ?? []).some((rpm, i) => {
+      const turn = Math.abs(angleOf(rpm, now.time) - this.angles[i]);
+      return 0.13 * turn > pixel && turn < SPOKES / 2;
+    });
+  }
+
+  pose(now) {
+    const attitude = new THREE.Quaternion();
+    if (now.q_nb && this.view === "space") attitude.set(...now.q_nb);
+    this.group.quaternion.copy(attitude);
+    this.sky.quaternion.copy(attitude);
+    this.showSun(now, attitude);
+    this.showCells(now);
+    (now.wheels_rpm ?? []).forEach((rpm, i) => this.spin(i, rpm, now.time));
+    this.seen = inSight(now, this.view);
+    this.angles = (now.wheels_rpm ?? []).map((rpm) => angleOf(rpm, now.time));
   }
 
   spin(i, rpm, time) {
     const wheel = this.wheels[i];
-    // a hundredth of the true rate: of the true one the eye would see nothing
-    wheel?.disc.quaternion.copy(wheel.at).multiply(new THREE.Quaternion().setFromAxisAngle(Z, ((rpm * time * Math.PI) / 30) * 0.01));
+    wheel?.disc.quaternion.copy(wheel.at).multiply(new THREE.Quaternion().setFromAxisAngle(Z, angleOf(rpm, time)));
   }
 
   showSun(now, attitude) {
@@ -218,7 +253,7 @@ export class Body {
 
   showCells(now) {
     const flies = (now.estimates ?? []).find((e) => e.flies) ?? now.estimates?.[0];
-    const [low, high, bad] = [colour("--rule"), colour("--lit"), colour("--bad")];
+    const [low, high, bad] = this.shades;
     this.cells.forEach(({ skin, dot }, i) => {
       const value = now.cells?.[i];
       const out = flies?.isolated.includes(i) || value === null || value === undefined;
@@ -232,21 +267,24 @@ export class Body {
   }
 
   draw() {
-    if (!this.renderer || this.asked) return;
-    this.asked = requestAnimationFrame(() => {
-      this.asked = 0;
-      const { clientWidth: width, clientHeight: height } = this.canvas;
-      if (!width || !height) return;
-      this.renderer.setPixelRatio(Math.min(devicePixelRatio, 1.5));
-      this.renderer.setSize(width, height, false);
-      this.camera.aspect = width / height;
-      this.camera.updateProjectionMatrix();
-      const flat = Math.cos(this.height);
-      this.camera.up.copy(Z);
-      this.camera.position.set(flat * Math.cos(this.azimuth), flat * Math.sin(this.azimuth), Math.sin(this.height)).multiplyScalar(this.distance);
-      this.camera.lookAt(0, 0, 0);
-      this.renderer.render(this.scene, this.camera);
-    });
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    if (!width || !height) return;
+    if (this.now) this.pose(this.now);
+    const ratio = this.software ? SOFTWARE_RATIO : Math.min(devicePixelRatio, 1.5);
+    if (this.renderer.getPixelRatio() !== ratio) this.renderer.setPixelRatio(ratio);
+    const size = this.renderer.getSize(new THREE.Vector2());
+    if (size.x !== width || size.y !== height) this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    const flat = Math.cos(this.height);
+    this.camera.up.copy(Z);
+    this.camera.position.set(flat * Math.cos(this.azimuth), flat * Math.sin(this.azimuth), Math.sin(this.height)).multiplyScalar(this.distance);
+    this.camera.lookAt(0, 0, 0);
+    this.renderer.render(this.scene, this.camera);
+    if (!this.software) return;
+    // waits for the picture, so that the painter knows what it takes
+    const gl = this.renderer.getContext();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
   }
 }
 

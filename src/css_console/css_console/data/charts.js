@@ -16,17 +16,24 @@ const COLOURS = {
 const DASHES = [[], [7, 4], [2, 3], [7, 3, 2, 3], [11, 4]];
 const LEAST = 1e-3; // [deg] for the logarithmic axis
 const MOST = 8000; // rows, after which the console is asked for thinner ones
-const DRAW_MS = 200;
+const DRAW_MS = 250;
 const dark = matchMedia("(prefers-color-scheme: dark)");
 
 export class Charts {
-  constructor(place, thin) {
+  constructor(place, thin, painter) {
     this.place = place;
     this.thin = thin;
     this.series = [];
     this.columns = [[]];
     this.charts = [];
-    this.drawn = 0;
+    this.stale = painter.part(() => this.draw(), DRAW_MS);
+    this.sight = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries) {
+        const chart = this.charts.find(({ place: own }) => own === target);
+        if (chart) chart.inView = isIntersecting;
+      }
+      this.stale();
+    });
     dark.addEventListener("change", () => this.build());
     new ResizeObserver(() => this.fit()).observe(place);
   }
@@ -35,7 +42,7 @@ export class Charts {
     const same = JSON.stringify(series) === JSON.stringify(this.series) && this.charts.length > 0;
     this.series = series;
     this.columns = columns.length === series.length + 1 ? columns : [[], ...series.map(() => [])];
-    if (same) this.draw(true);
+    if (same) this.stale(true);
     else this.build();
   }
 
@@ -48,16 +55,18 @@ export class Charts {
     times.push(time);
     row.forEach((value, i) => this.columns[i + 1].push(value));
     if (times.length === MOST) this.thin();
-    this.draw();
+    this.stale();
   }
 
   build() {
     for (const { plot } of this.charts) plot.destroy();
+    this.sight.disconnect();
     this.charts = [];
     this.place.replaceChildren();
     const names = ORDER.filter((name) => this.series.some((s) => s.chart === name));
     for (const name of names) this.charts.push(this.chart(name));
-    this.draw(true);
+    for (const { place } of this.charts) this.sight.observe(place);
+    this.stale(true);
   }
 
   chart(name) {
@@ -90,7 +99,7 @@ export class Charts {
       series: [{}, ...indices.map((i, k) => ({ label: this.series[i].name, width: 1.5, ...look(k), spanGaps: false, points: { show: false } }))],
     }, [[], ...indices.map(() => [])], place);
     indices.forEach((i, k) => legend.append(this.entry(plot, k + 1, this.series[i].name, look(k))));
-    return { name, indices, plot, place };
+    return { name, indices, plot, place, inView: true };
   }
 
   entry(plot, k, text, look) {
@@ -115,15 +124,9 @@ export class Charts {
     return button;
   }
 
-  draw(now = false) {
-    if (!now && performance.now() - this.drawn < DRAW_MS) {
-      this.later ??= setTimeout(() => this.draw(true), DRAW_MS);
-      return;
-    }
-    clearTimeout(this.later);
-    this.later = undefined;
-    this.drawn = performance.now();
-    for (const { name, indices, plot } of this.charts) {
+  draw() {
+    for (const { name, indices, plot, inView } of this.charts) {
+      if (!inView) continue;
       const columns = indices.map((i) => this.columns[i + 1]);
       const shown = LOGARITHMIC.has(name)
         ? columns.map((c) => c.map((v) => (v === null ? null : Math.max(v, LEAST)))) : columns;

@@ -3,9 +3,11 @@
 
 import { Body } from "./body.js";
 import { Charts } from "./charts.js";
-import { Controls } from "./controls.js";
+import { Controls, put } from "./controls.js";
+import { Painter } from "./painter.js";
 import { Line } from "./socket.js";
 
+const NUMBERS_MS = 100;
 const $ = (id) => document.getElementById(id);
 const degrees = (value) => (value === null || value === undefined ? "–" : `${value.toFixed(value < 10 ? 2 : 1)} deg`);
 
@@ -14,9 +16,10 @@ const line = new Line((there) => {
   $("link").classList.toggle("bad", !there);
 });
 const controls = new Controls(line);
-const charts = new Charts($("charts"), () => line.tell({ do: "history" }));
-const body = new Body($("scene"), $("no-scene"));
-$("view").addEventListener("change", () => { body.view = $("view").value; body.show(body.now); });
+const painter = new Painter();
+const charts = new Charts($("charts"), () => line.tell({ do: "history" }), painter);
+const body = new Body($("scene"), $("no-scene"), painter);
+$("view").addEventListener("change", () => body.seeFrom($("view").value));
 
 let series = [];
 line.on("scene", (scene) => {
@@ -25,7 +28,7 @@ line.on("scene", (scene) => {
   document.title = `${title} · Sunpoint console`;
   $("title").textContent = title;
   controls.show(scene);
-  body.become?.(scene.craft);
+  body.become(scene.craft);
   const changed = JSON.stringify(series) !== JSON.stringify(scene.series);
   series = scene.series;
   if (changed) line.tell({ do: "history" });
@@ -50,32 +53,42 @@ line.on("log", ({ log }) => {
     return item;
   }));
 });
+
+let latest = null;
+const numbersAreStale = painter.part(() => numbers(latest), NUMBERS_MS);
 line.on("frame", (frame) => {
-  controls.showPace(frame.pace);
-  $("factor").textContent = frame.factor === null ? (frame.pace.paused ? "held" : "stands still") : `${frame.factor.toPrecision(3)} ×`;
-  const now = frame.now;
+  latest = frame;
   document.documentElement.dataset.frame = frame.number;
+  if (frame.now) {
+    charts.add(frame.now.time, frame.row);
+    body.show(frame.now);
+  }
+  numbersAreStale();
+});
+
+function numbers(frame) {
+  controls.showPace(frame.pace);
+  put($("factor"), frame.factor === null ? (frame.pace.paused ? "held" : "stands still") : `${frame.factor.toPrecision(3)} ×`);
   list($("faults"), frame.faults);
+  const now = frame.now;
   if (!now) return;
-  charts.add(now.time, frame.row);
   controls.showTime(now.time);
-  body.show(now);
   const flies = now.estimates.find((e) => e.flies) ?? now.estimates[0];
-  $("time").textContent = `${now.time.toFixed(1)} s`;
+  put($("time"), `${now.time.toFixed(1)} s`);
   $("time").title = now.utc;
-  $("mode").textContent = now.control ? `${now.control.mode} (${now.control.reason})` : "–";
-  $("error").textContent = degrees(flies?.error_deg);
-  $("bound").textContent = degrees(flies?.bound_deg);
-  $("pointing").textContent = degrees(now.pointing_deg);
+  put($("mode"), now.control ? `${now.control.mode} (${now.control.reason})` : "–");
+  put($("error"), degrees(flies?.error_deg));
+  put($("bound"), degrees(flies?.bound_deg));
+  put($("pointing"), degrees(now.pointing_deg));
   const rate = now.rate_deg_s ? Math.hypot(...now.rate_deg_s) : null;
-  $("rate").textContent = rate === null ? "–" : `${rate.toFixed(3)} deg/s`;
-  $("sunlit").textContent = now.sunlit === undefined ? "–" : `${Math.round(100 * now.sunlit)} %`;
+  put($("rate"), rate === null ? "–" : `${rate.toFixed(3)} deg/s`);
+  put($("sunlit"), now.sunlit === undefined ? "–" : `${Math.round(100 * now.sunlit)} %`);
   estimates(now.estimates);
   bars($("cells"), now.cells ?? [], (v) => v, (i) => flies?.lit.includes(i), (i) => flies?.isolated.includes(i), "");
   show($("wheels-box"), $("wheels"), now.wheels_rpm, now.control?.wheels_isolated, "rpm");
   show($("rods-box"), $("rods"), now.rods, now.control?.rods_isolated, "");
   list($("verdicts"), now.health.map((v) => `${v.node}: ${v.unit} ${v.kind}, ${v.evidence}, since ${v.since_s.toFixed(1)} s`));
-});
+}
 
 function show(box, place, values, out, unit) {
   box.hidden = !values?.length;
@@ -100,11 +113,14 @@ function bars(place, values, length, used, out, unit) {
   }
   values.forEach((value, i) => {
     const item = place.children[i];
-    item.querySelector("rect").setAttribute("width", Math.min(100, Math.max(0, 100 * length(value ?? 0))));
-    item.lastChild.textContent = value === null ? "none" : `${value.toFixed(unit === "rpm" ? 0 : 3)}`;
+    const width = String(Math.round(Math.min(100, Math.max(0, 100 * length(value ?? 0)))));
+    const bar = item.querySelector("rect");
+    if (bar.getAttribute("width") !== width) bar.setAttribute("width", width);
+    put(item.lastChild, value === null ? "none" : value.toFixed(unit === "rpm" ? 0 : 3));
     item.classList.toggle("fault", Boolean(out(i)) || value === null);
     item.classList.toggle("used", Boolean(used(i)));
-    item.title = out(i) ? "held for failed, left out" : used(i) ? "used by the estimate" : "";
+    const said = out(i) ? "held for failed, left out" : used(i) ? "used by the estimate" : "";
+    if (item.title !== said) item.title = said;
   });
 }
 
@@ -125,6 +141,6 @@ function estimates(given) {
   while (table.rows.length > rows.length + 1) table.deleteRow(-1);
   [head, ...rows].forEach((texts, r) => {
     const row = table.rows[r] ?? table.insertRow();
-    texts.forEach((text, c) => { (row.cells[c] ?? row.appendChild(document.createElement(r ? "td" : "th"))).textContent = text; });
+    texts.forEach((text, c) => { put(row.cells[c] ?? row.appendChild(document.createElement(r ? "td" : "th")), text); });
   });
 }

@@ -4,6 +4,11 @@
 const $ = (id) => document.getElementById(id);
 const SPEEDS = [[1, "1 ×"], [10, "10 ×"], [60, "60 ×"], [0, "as fast as it goes"]];
 
+// A text in its place; the same text once more would be laid out again.
+export function put(place, text) {
+  if (place.textContent !== text) place.textContent = text;
+}
+
 // Choices, and which of them is the present one; what somebody has chosen stays until that changes.
 export function fill(select, names, chosen) {
   const wanted = JSON.stringify([names, chosen]);
@@ -110,8 +115,8 @@ export class Controls {
 
   showPace(pace) {
     this.pace = pace;
-    $("toggle").textContent = pace.paused ? "Go on" : "Pause";
-    if (document.activeElement !== $("speed")) $("speed").value = pace.rate;
+    put($("toggle"), pace.paused ? "Go on" : "Pause");
+    if (document.activeElement !== $("speed") && $("speed").value !== String(pace.rate)) $("speed").value = pace.rate;
   }
 
   showTime(time) {
@@ -124,22 +129,22 @@ export class Controls {
     this.nodes = nodes;
     const gyro = nodes.find((row) => row.node === this.gyro);
     this.gyroActive = gyro?.state === "active";
-    $("gyro").textContent = this.gyroActive ? "Gyro off" : "Gyro on";
-    $("gyro-state").textContent = gyro ? `gyro is ${gyro.state}` : "";
-    $("director").textContent = director.message ? `${director.node}: ${director.message}` : "";
+    put($("gyro"), this.gyroActive ? "Gyro off" : "Gyro on");
+    put($("gyro-state"), gyro ? `gyro is ${gyro.state}` : "");
+    put($("director"), director.message ? `${director.node}: ${director.message}` : "");
     const table = $("nodes").tBodies[0];
     const known = new Map([...table.rows].map((row) => [row.dataset.node, row]));
     for (const told of nodes) {
       const row = known.get(told.node) ?? this.nodeRow(table, told.node);
       known.delete(told.node);
       const counters = Object.entries(told.counters).filter(([, value]) => value !== "0").map(([key, value]) => `${key} ${value}`);
-      row.cells[1].textContent = told.state || "–";
-      row.cells[2].textContent = told.message || "–";
-      row.cells[2].className = told.level;
-      row.cells[3].textContent = counters.join(", ") || "–";
+      put(row.cells[1], told.state || "–");
+      put(row.cells[2], told.message || "–");
+      if (row.cells[2].className !== told.level) row.cells[2].className = told.level;
+      put(row.cells[3], counters.join(", ") || "–");
       const button = row.cells[4].firstChild;
       button.hidden = !["active", "inactive"].includes(told.state);
-      button.textContent = told.state === "active" ? "Deactivate" : "Activate";
+      put(button, told.state === "active" ? "Deactivate" : "Activate");
       row.dataset.state = told.state;
     }
     for (const gone of known.values()) gone.remove();

@@ -15,7 +15,7 @@ from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import own_domain
 from css_bringup.mission_asked_for import mission_of, overrides_of
 from css_bringup.options import console, errors
-from css_bringup.staying import fly_and_stay
+from css_bringup.staying import Staying, fly_and_stay
 from css_bringup.verbs.fly import conclude
 from css_common.command import FAILED, INTERRUPTED
 from css_common.executor import create_executor
@@ -69,7 +69,7 @@ def _fly(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
         return conclude(flown, result, as_json=False, with_page=options.record)
 
     with own_domain(mission.name, options.domain, None, console), _Served(options, libraries, "flight", told) as served:
-        code = fly_and_stay(wish, mission, bag_of, console, end, rate)
+        code = fly_and_stay(wish, mission, Staying(bag_of, console, end), rate)
     return served.code(code)
 
 

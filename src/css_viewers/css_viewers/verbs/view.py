@@ -3,17 +3,19 @@
 
 import argparse
 import json
+from collections.abc import Iterator
+from heapq import merge
+from operator import attrgetter
 from pathlib import Path
-from typing import Any
 
 from css_common.command import FAILED
 from css_common.progress_lines import still_working
 from css_recording.bag_metadata import Topic
-from css_recording.bag_reader import BagReader
+from css_recording.bag_reader import BagMessage, BagReader
 from css_recording.bag_writer import BagWriter
 from css_viewers.definitions import definition_of
 from css_viewers.errors import ViewerError
-from css_viewers.viewed_bag import ViewedBag, mission_of
+from css_viewers.viewed_bag import Drawn, ViewedBag, mission_of
 
 
 def run(options: argparse.Namespace) -> int:
@@ -22,16 +24,19 @@ def run(options: argparse.Namespace) -> int:
         viewed = ViewedBag(reader, mission_of(reader, options.mission), options.every)
         with still_working(f"drawing {options.bag}"):
             if options.rerun is not None:
-                written = _write_rerun(viewed, options.rerun)
+                file = options.rerun
+                _write_rerun(viewed, file)
             else:
-                written = _write_bag(reader, viewed, options.output or _beside(options.bag), options.overwrite)
+                file = options.output or _beside(options.bag)
+                _write_bag(reader, viewed, file, options.overwrite)
         told = [f"not drawn, as the recording has no {topic}" for topic in viewed.absent]
         told += [*viewed.reports, *map(str, reader.refused), *(f"note: {note}" for note in reader.notes)]
         refused = viewed.refused + sum(one.count for one in reader.refused)
-    print(f"{written['file']}: {written['messages']} messages for viewers, {written['seconds']:.1f} s of flight")
+    print(f"{file}: {viewed.drawn} messages for viewers, {viewed.seconds:.1f} s of flight")
     for line in told:
         print(line)
     if options.json:
+        written = {"file": str(file), "messages": viewed.drawn, "seconds": viewed.seconds}
         print(json.dumps({**written, "refused": refused, "notes": told}, allow_nan=False))
     return FAILED if refused else 0
 
@@ -41,7 +46,7 @@ def _beside(bag: Path) -> Path:
     return whole.with_name(f"{whole.name}_viewers")
 
 
-def _write_bag(reader: BagReader, viewed: ViewedBag, folder: Path, overwrite: bool) -> dict[str, Any]:
+def _write_bag(reader: BagReader, viewed: ViewedBag, folder: Path, overwrite: bool) -> None:
     """Copies the recording and adds what is drawn."""
     there = {entry.topic.name for entry in reader.topics}
     drawn = {name: kind for name, kind in viewed.topics.items()}
@@ -49,24 +54,13 @@ def _write_bag(reader: BagReader, viewed: ViewedBag, folder: Path, overwrite: bo
         raise ViewerError(f"{reader.path}: has {', '.join(sorted(there & drawn.keys()))} already; open it as it is")
     topics = [entry.topic for entry in reader.topics]
     topics += [Topic(name, kind, schema=definition_of(kind)) for name, kind in drawn.items()]
-    count, first_ns, last_ns = 0, 0, 0
     with BagWriter(folder, topics, dict(reader.description), overwrite=overwrite) as writer:
-        waiting = viewed.messages()
-        message = next(waiting, None)
-        for read in reader.messages():
-            while message is not None and message.stamp_ns <= read.stamp_ns:
-                writer.write(message.topic, message.stamp_ns, message.data)
-                count, first_ns, last_ns = count + 1, first_ns or message.stamp_ns, message.stamp_ns
-                message = next(waiting, None)
-            writer.write(read.topic, read.stamp_ns, read.data)
-        while message is not None:
+        both: Iterator[Drawn | BagMessage] = merge(viewed.messages(), reader.messages(), key=attrgetter("stamp_ns"))
+        for message in both:
             writer.write(message.topic, message.stamp_ns, message.data)
-            count, first_ns, last_ns = count + 1, first_ns or message.stamp_ns, message.stamp_ns
-            message = next(waiting, None)
-    return {"file": str(folder), "messages": count, "seconds": (last_ns - first_ns) / 1e9}
 
 
-def _write_rerun(viewed: ViewedBag, file: Path) -> dict[str, Any]:
+def _write_rerun(viewed: ViewedBag, file: Path) -> None:
     from css_viewers.rerun_file import write_rerun  # not everybody has it
 
-    return write_rerun(viewed, file)
+    write_rerun(viewed, file)
