@@ -14,6 +14,7 @@ from css_export.layout import pack
 from css_export.library import Library, state_values
 from css_export.operations import OPERATIONS, Cost, cost_of
 from css_export.recorded_calls import Calls
+from css_export.shipped_mathematics import PREFIX
 from css_export.speed import engine_of, struct_at
 
 _COUNTS = "sunpoint.counts"
@@ -66,7 +67,7 @@ def with_counters(text: str) -> tuple[list[str], str]:
     codes = functions_of(text)
     costs: dict[int, Cost] = {}
     for code in codes.values():
-        for block in code.blocks.values():
+        for block in () if code.name.startswith(PREFIX) else code.blocks.values():
             costs[block.at] = _own(block, codes, code.name)
     kinds = sorted({OPERATIONS, *(kind for cost in costs.values() for kind in cost)})
     changed: list[str] = []

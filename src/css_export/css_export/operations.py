@@ -2,9 +2,9 @@
 """How many operations a function makes at most, from its intermediate code after optimisation, and where nobody knows.
 
 An operation is an instruction of that code but for those that stand for none: where ways meet, what is told to the
-compiler alone. Copying and clearing memory counts one for each word of 64 bits. A function of the C library counts
-one and is counted by its name. The longest way through the blocks is taken, each loop as often as it goes round at
-most.
+compiler alone. Copying and clearing memory counts one for each word of 64 bits. A function of mathematics, linked or
+shipped with the library, counts one and is counted by its name. The longest way through the blocks is taken, each loop
+as often as it goes round at most.
 """
 
 from collections.abc import Iterable, Mapping
@@ -16,7 +16,7 @@ from css_export.code_text import Code, Instruction, callee, functions_of, is_cal
 from css_export.errors import ExportError
 from css_export.names import of_python
 from css_export.range_arithmetic import ANY, Range
-from css_export.shipped_mathematics import EXACT
+from css_export.shipped_mathematics import EXACT, PREFIX
 
 OPERATIONS = ""
 """Under which operations are counted; C functions are under their names."""
@@ -65,7 +65,7 @@ class Bound:
 
     Attributes:
         operations: at most; None: no bound was found.
-        calls: of functions that are linked, at most, by their names.
+        calls: of functions of mathematics, at most, by their names.
         reason: what has no bound; "": all has.
     """
 
@@ -166,7 +166,7 @@ class _Bounds:
             called = callee(made) if is_call(made) else None
             lengths = []
             if called is not None:
-                if called[0] in self._codes:
+                if called[0] in self._codes and not called[0].startswith(PREFIX):
                     given = tuple(ranges.of(argument, name) for argument in called[1])
                     total = _sum(total, self.of(called[0], given))
                 lengths = [ranges.of(argument, name) for argument in called[1][2:3]]
@@ -190,8 +190,9 @@ def cost_of(made: Instruction, codes: Iterable[str], lengths: Iterable[Range], f
     called = callee(made)
     if called is None:
         raise _NoBoundError(f"{of_python(function)} calls a function whose name is not known")
-    name = called[0]
-    if name in codes:
+    # shipped with the library or linked: it is counted by its name
+    name = called[0].removeprefix(PREFIX)
+    if name == called[0] and name in codes:
         return {OPERATIONS: 1}
     if not name.startswith("llvm."):
         # what IEEE 754 defines is an operation, be it an instruction of the processor or none

@@ -147,6 +147,20 @@ define void @f(ptr %p) {
     assert bound_of(text, "f") == Bound(3 + (1 + 4 * 3 + 3) + (1 + 4 * 5 + 3))
 
 
+def test_mathematics_that_is_shipped_is_counted_by_name():
+    text = (
+        loop("%n", name="sunpoint.math.sin")
+        + """
+define void @f(ptr %p) {
+  call void @sunpoint.math.sin(ptr %p, i64 3)
+  ret void
+}
+"""
+    )
+    assert bound_of(text, "f") == Bound(2, {"sin": 1})
+    assert with_counters(text)[1].count("store i64") == 2
+
+
 def test_whole_numbers_of_the_parameters_have_their_limits():
     text = """
 define void @f(ptr %p) {
