@@ -13,6 +13,7 @@ from css_export.flown import INPUT, OUTPUT, PARAMETERS, STATE
 from css_export.layout import pack
 from css_export.library import Library, state_values
 from css_export.operations import OPERATIONS, Cost, cost_of
+from css_export.range_arithmetic import ANY, Range
 from css_export.recorded_calls import Calls
 from css_export.shipped_mathematics import PREFIX
 from css_export.speed import engine_of, struct_at
@@ -84,7 +85,9 @@ def _own(block: Block, codes: Iterable[str], function: str) -> Cost:
     total: Cost = {}
     for made in block.instructions:
         called = callee(made) if is_call(made) else None
-        lengths = [literal(value) for value in called[1][2:3]] if called else []
+        # of a length that stands nowhere no words are counted: less than there are, never more
+        given = [literal(value) for value in called[1][2:3]] if called else []
+        lengths = [Range(0, 0) if length == ANY else length for length in given]
         for kind, count in cost_of(made, codes, lengths, function).items():
             total[kind] = total.get(kind, 0) + count
     return total

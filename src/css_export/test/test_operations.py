@@ -301,3 +301,11 @@ def test_counters_stand_in_every_block():
     kinds, text = with_counters(loop("10"))
     assert kinds == [OPERATIONS]
     assert text.count("store i64") == 4
+
+
+def test_what_is_cleared_of_an_unknown_length_is_counted_once():
+    cleared = "  call void @llvm.memset.p0.i64(ptr %p, i8 0, i64 {}, i1 false)\n"
+    counts = [with_counters(loop("10", cleared.format(length)))[1] for length in ("%n", "16")]
+    # with the sum and the branch of that block, and two words of 64 bits
+    assert ["add i64 %sunpoint" in text for text in counts] == [True, True]
+    assert ".old, 3\n" in counts[0] and ".old, 5\n" in counts[1]

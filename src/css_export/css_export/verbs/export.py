@@ -120,7 +120,7 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
                 shared = place / HOST / f"lib{library.prefix}.so"
                 if row.code.target.name == HOST and shared.is_file():
                     row.time_ratio = time_ratio(library, shared, calls)
-                if row.code.target.name == HOST and calls.steps:
+                if row.code.target.name == HOST and calls.steps and row.code.bound.operations is not None:
                     row.counted = most_counted(library, row.code.text, calls)
                 if row.verdict.equal != row.verdict.steps:
                     row.differing = differing_functions(row.code.contents.missing, row.code.target, place)
