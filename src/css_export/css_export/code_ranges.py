@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from css_export.code_conditions import Condition, Conditions, swapped
 from css_export.code_loops import Flow, Loop
+from css_export.code_numbers import BINARY, added_number, literal
 from css_export.code_text import NAME, VALUE, Instruction, callee, is_call, parts, plain
 from css_export.range_arithmetic import ANY, Range, binary, casted, intrinsic, joined, narrowed
 
 _MOST = 10**9  # rounds beyond which a bound is none
-_BINARY = re.compile(rf"^((?:[a-z]+ )*)i(\d+) ({VALUE}), ({VALUE})")
 _CAST = re.compile(rf"^((?:[a-z]+ )*)i(\d+) ({VALUE}) to i(\d+)")
 _CHOSEN = re.compile(rf"^i1 ({VALUE}), i\d+ ({VALUE}), i\d+ ({VALUE})")
 _INCOMING = re.compile(rf"^\[ (.*), %({NAME}) \]$")
@@ -103,7 +103,7 @@ class Ranges:
             return self.of(made.rest.split()[-1], block)
         if made.opcode in ("icmp", "fcmp"):
             return Range(0, 1)
-        if made.opcode in _SUMS and (found := _BINARY.match(made.rest)):
+        if made.opcode in _SUMS and (found := BINARY.match(made.rest)):
             one, other = (self.of(found[k], block) for k in (3, 4))
             return binary(made.opcode, found[1].split(), int(found[2]), one, other)
         if made.opcode in _CASTS and (found := _CAST.match(made.rest)):
@@ -138,6 +138,9 @@ class Ranges:
         steps = self._steps(value, loop) if loop else None
         if loop and steps:
             return self._over_rounds(loop, steps)
+        grown = self._grown(value, loop, made) if loop else None
+        if grown is not None:
+            return grown
         return joined(
             self._under(self.of(one, before), one, self._conditions.on_edge(before, where), before)
             for one, before in self._incoming(made)
@@ -152,6 +155,43 @@ class Ranges:
         if steps.step >= 0:
             return Range(start.low, None if start.high is None or way is None else start.high + way)
         return Range(None if start.low is None or way is None else start.low + way, start.high)
+
+    def _grown(self, value: str, loop: Loop, made: Instruction) -> Range | None:
+        """A value to which some rounds of a loop add a number; None: it is none."""
+        start = joined(self.of(one, before) for one, before in self._incoming(made) if before not in loop.blocks)
+        rounds = self.rounds(loop)
+        if rounds is None or start.low is None or start.high is None:
+            return None
+        added = [self._growth(one, value, loop, {}) for one, before in self._incoming(made) if before in loop.blocks]
+        whole = joined(Range(0, 0) if a is None else a for a in added)
+        if None in added or whole.low is None or whole.high is None:
+            return None
+        return Range(start.low + rounds * min(0, whole.low), start.high + rounds * max(0, whole.high))
+
+    def _growth(self, value: str, since: str, loop: Loop, known: dict[str, Range | None]) -> Range | None:
+        """By how much a value is more than another one of the same round; None: nobody knows."""
+        if value == since:
+            return Range(0, 0)
+        if value not in known:
+            known[value] = None  # while it is looked for
+            known[value] = self._more(value, since, loop, known)
+        return known[value]
+
+    def _more(self, value: str, since: str, loop: Loop, known: dict[str, Range | None]) -> Range | None:
+        where, made = self._where.get(value, ("", None))
+        if made is None or where not in loop.blocks:
+            return None
+        if (added := added_number(made)) is not None:
+            less = self._growth(added[0], since, loop, known)
+            return None if less is None else binary("add", ("nsw",), 64, less, Range(added[1], added[1]))
+        if made.opcode == "select" and (found := _CHOSEN.match(made.rest)):
+            ways = [found[2], found[3]]
+        elif made.opcode == "phi" and where not in loop.headers:
+            ways = [one for one, _ in self._incoming(made)]
+        else:
+            return None
+        found_of = [self._growth(one, since, loop, known) for one in ways]
+        return None if None in found_of else joined(way for way in found_of if way is not None)
 
     # Rounds
 
@@ -248,7 +288,7 @@ class Ranges:
                 return None
             if made.opcode == "phi":
                 return self._of_header(value, made, loop, offset) if where in loop.headers else None
-            added = _added(made)
+            added = added_number(made)
             if added is None:
                 return None
             value, more, _ = added
@@ -274,7 +314,7 @@ class Ranges:
                     own.add(one)
                     waiting += self._incoming(made_of)
                     break
-                added = _added(made_of) if made_of else None
+                added = added_number(made_of) if made_of else None
                 if added is None:
                     return None
                 one, more, never_overflows = added
@@ -313,32 +353,13 @@ class Ranges:
 
     def _loses_a_bit(self, value: str, after: str) -> bool:
         made = self._where[after][1] if after in self._where else None
-        found = _BINARY.match(made.rest) if made else None
+        found = BINARY.match(made.rest) if made else None
         if made is None or found is None:
             return False
         if made.opcode == "lshr":
             return found[3] == value and found[4].isdigit() and int(found[4]) > 0
         if made.opcode == "and" and value in (found[3], found[4]):
             other = found[4] if found[3] == value else found[3]
-            less = _added(self._where[other][1]) if other in self._where else None
+            less = added_number(self._where[other][1]) if other in self._where else None
             return less is not None and less[:2] == (value, -1)
         return False
-
-
-def _added(made: Instruction) -> tuple[str, int, bool] | None:
-    """Of a sum of a value and a number: the value, the number, and whether it never overflows."""
-    found = _BINARY.match(made.rest) if made.opcode in ("add", "sub", "or") else None
-    if found is None or not re.fullmatch(r"-?\d+", found[4]):
-        return None
-    flags = found[1].split()
-    if made.opcode == "or" and "disjoint" not in flags:
-        return None
-    number = -int(found[4]) if made.opcode == "sub" else int(found[4])
-    return found[3], number, made.opcode == "or" or "nsw" in flags or "nuw" in flags
-
-
-def literal(value: str) -> Range:
-    """Of a number as it stands in the code; of anything else nothing is known."""
-    if value in ("true", "false"):
-        return Range(int(value == "true"), int(value == "true"))
-    return Range(int(value), int(value)) if re.fullmatch(r"-?\d+", value) else ANY

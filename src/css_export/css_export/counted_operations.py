@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from css_export.c_main import BEGIN, STEP
 from css_export.c_main import PARAMETERS as PARAMETERS_WORD
-from css_export.code_ranges import literal
+from css_export.code_numbers import literal
 from css_export.code_text import Block, callee, functions_of, is_call
 from css_export.flown import INPUT, OUTPUT, PARAMETERS, STATE
 from css_export.layout import pack

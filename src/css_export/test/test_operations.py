@@ -183,6 +183,35 @@ over:
     assert bound_of(text, "f", [(8, 0, 9)]).operations is None
 
 
+def test_what_some_rounds_count_is_no_more_than_all_rounds():
+    text = """
+define void @f(ptr %p, i1 %c) {
+entry:
+  br label %head
+head:
+  %i = phi i64 [ 0, %entry ], [ %i.next, %back ]
+  %some = phi i64 [ 2, %entry ], [ %more, %back ]
+  br i1 %c, label %one, label %back
+one:
+  %two = add i64 %some, 2
+  br label %back
+back:
+  %either = phi i64 [ %two, %one ], [ %some, %head ]
+  %none = add i64 %some, -1
+  %more = select i1 %c, i64 %either, i64 %none
+  %i.next = add nuw nsw i64 %i, 1
+  %end = icmp eq i64 %i.next, 8
+  br i1 %end, label %clear, label %head
+clear:
+  %bytes = shl nuw nsw i64 %some, 3
+  call void @llvm.memset.p0.i64(ptr %p, i8 0, i64 %bytes, i1 false)
+  ret void
+}
+"""
+    # in 7 rounds back and 1 more it has grown by 2 at most in each of the first
+    assert bound_of(text, "f") == Bound(1 + 8 * 8 + 1 + (1 + 2 + 7 * 2) + 1)
+
+
 def test_bits_that_are_taken_one_by_one():
     text = """
 define i64 @f(ptr %p, i64 %mask) {
