@@ -6,9 +6,13 @@ an export failed, or a step differs by more than the last bits of named function
 
     python benchmarks/exported_missions.py --missions okeefe_2013 --duration 600
     python benchmarks/exported_missions.py --mathematics musl --steps 3000 --targets x86_64 aarch64 cortex-m7
+    python benchmarks/exported_missions.py --folder whole_orbits
+
+With a folder, recordings and results are kept there, a mission after the other, and what is there is not made again.
 """
 
 import argparse
+import contextlib
 import json
 import subprocess
 import sys
@@ -33,12 +37,14 @@ def main() -> int:
     parser.add_argument("--steps", type=int, metavar="N", help="compared of each component; default: all that flew")
     parser.add_argument("--mathematics", choices=("target", "musl"), default="target", help="as of `export`")
     parser.add_argument("--targets", nargs="+", default=list(_TARGETS), metavar="NAME")
+    parser.add_argument("--folder", type=Path, metavar="DIR", help="where to keep recordings and results, and go on")
     options = parser.parse_args()
     results: list[dict[str, Any]] = []
     failed: list[str] = []
-    with tempfile.TemporaryDirectory() as folder:
+    with contextlib.ExitStack() as stack:
+        folder = options.folder or Path(stack.enter_context(tempfile.TemporaryDirectory()))
         for mission in options.missions:
-            told, code = _compared(mission, options, Path(folder) / mission)
+            told, code = _kept(mission, options, folder / mission)
             results += [{"mission": mission, **result} for result in told]
             if code != 0:
                 failed.append(mission)
@@ -47,11 +53,25 @@ def main() -> int:
     return 1 if failed else 0
 
 
+def _kept(mission: str, options: argparse.Namespace, folder: Path) -> tuple[list[dict[str, Any]], int]:
+    """What came of a mission, from the file of an earlier run with the same options where there is one."""
+    asked = [options.duration, options.steps, options.mathematics, options.targets]
+    file = folder / "results.json"
+    if file.is_file():
+        known = json.loads(file.read_text())
+        if known["asked"] == asked:
+            return known["results"], known["code"]
+    results, code = _compared(mission, options, folder)
+    if results:
+        file.write_text(json.dumps({"asked": asked, "results": results, "code": code}))
+    return results, code
+
+
 def _compared(mission: str, options: argparse.Namespace, folder: Path) -> tuple[list[dict[str, Any]], int]:
     bag = folder / "bag"
     length = [] if options.duration is None else ["--duration", f"{options.duration}"]
     # a flight may miss a criterion of its mission and be a flight nevertheless
-    if _run("fly", mission, *length, "--out", str(bag)).returncode not in (0, 1):
+    if not _has_flown(bag) and _run("fly", mission, *length, "--out", str(bag)).returncode not in (0, 1):
         return [], 1
     most = [] if options.steps is None else ["--steps", f"{options.steps}"]
     asked = ["--target", *options.targets, "--mathematics", options.mathematics, "--verify", str(bag), *most]
@@ -62,6 +82,11 @@ def _compared(mission: str, options: argparse.Namespace, folder: Path) -> tuple[
     return json.loads(lines[-1])["results"], done.returncode
 
 
+def _has_flown(bag: Path) -> bool:
+    # what describes a recording is written at its end
+    return (bag / "metadata.yaml").is_file()
+
+
 def _run(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([str(ROOT / "sunpoint"), *arguments], stdout=subprocess.PIPE, text=True, check=False)
 
@@ -70,12 +95,12 @@ def _print(results: list[dict[str, Any]]) -> None:
     table = ReadableTable()
     for heading in ("mission", "library", "target"):
         table.add_name(heading)
-    for heading in ("code\n[bytes]", "stack\n[bytes]", "steps", "equal", "largest\ndifference"):
+    for heading in ("code\n[bytes]", "stack\n[bytes]", "operations\nat most", "steps", "equal", "largest\ndifference"):
         table.add_number(heading)
     table.add_name("differing functions")
     for r in results:
         compared = [f"{r[key]}" for key in ("steps", "equal_steps", "largest_relative_difference")]
-        sizes = [f"{r[key]}" for key in ("code_bytes", "stack_bytes")]
+        sizes = [f"{r[key]}" for key in ("code_bytes", "stack_bytes", "operations_at_most")]
         named = ", ".join(r["differing_functions"] or {}) or r["not_run"] or ""
         table.add_texts([r["mission"], r["component"], r["target"], *sizes, *compared, named])
     Console(highlight=False).print(table)

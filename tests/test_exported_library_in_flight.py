@@ -127,6 +127,15 @@ def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
             step(*arguments)
 
 
+def test_a_library_that_ends_in_flight_holds_nobody_up(mission, files):
+    """That it has ended is known at once: no time is waited for what cannot come, and the verdict says it."""
+    with ComposedFlight(mission, stand_ins=stand_ins(mission, [f"ekf={files['crashing']}"])) as flight:
+        result = flight.fly()
+    assert not result.failure
+    assert "ekf: 171 cycles failed and gave no output" in result.notes
+    assert not [note for note in result.notes if "time held" in note or "silent beyond" in note]
+
+
 @pytest.mark.parametrize(
     ("asked", "said"),
     [

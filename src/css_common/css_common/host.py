@@ -380,8 +380,18 @@ class ComponentNode(LifecycleNode):
             self._publish(outgoing)
         except Exception as error:
             self._report_failure(error)
+            self._say_that_nothing_comes(stamp_ns)
         else:
             self.counters["cycles"] += 1
+
+    def _say_that_nothing_comes(self, stamp_ns: int) -> None:
+        """Has nobody wait for the messages of a cycle that failed, where time would stand still for them."""
+        if not self._awaited_in_lockstep():
+            return
+        try:
+            self._publish(self.stepper.gaps(stamp_ns))
+        except Exception as error:
+            self._report_failure(error)
 
     def _let_fail(self, stamp_ns: int) -> None:
         """Has the faults of its process that are due."""

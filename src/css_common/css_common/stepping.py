@@ -131,7 +131,8 @@ class Stepper:
             if type(given) is Sample and given.frame_id == GAP:
                 received = {key: None if _is_gap(one) else one for key, one in received.items()}
                 if self._lacks(component.step_of(stamp_ns), received):
-                    return self._nothing(stamp_ns)
+                    self.skipped += 1
+                    return self.gaps(stamp_ns)
                 break
         return (component.cycle if self.is_active else component.idle)(stamp_ns, received)
 
@@ -139,9 +140,8 @@ class Stepper:
         """Whether there is no cycle because a message that it needs did not come."""
         return any(step % divider == 0 and received.get(key) is None for key, divider in self._required.items())
 
-    def _nothing(self, stamp_ns: int) -> Outgoing:
+    def gaps(self, stamp_ns: int) -> Outgoing:
         """Gaps in the place of the messages of a cycle that there is not."""
-        self.skipped += 1
         step = self.component.step_of(stamp_ns)
         due = (key for key, divider in self.dividers.items() if step % divider == 0)
         return {key: gap(self.ports[key], stamp_ns) for key in due}

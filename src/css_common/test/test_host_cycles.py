@@ -10,6 +10,7 @@ from sensor_msgs.msg import Imu
 
 from css_common.codec import codec_of
 from css_common.component import Component
+from css_common.link import GAP
 from css_common.mission import find_component
 from css_common.schema import default_values
 from css_common.testing import Bench
@@ -134,7 +135,10 @@ def test_cycle_that_fails_in_any_way_is_counted_logged_once_and_survived(rig, be
     bench.until(lambda: bench.logged(FAULTS[fault]), "the traceback is logged")
     assert rig.set_parameter("fault", "none").successful
     rig.feed(voltages(4))
-    rig.until_estimates(2)
+    rig.until_estimates(5)
+    # nobody has to wait for what does not come
+    assert [e.frame_id for e in rig.estimates] == ["bus", GAP, GAP, GAP, "bus"]
+    assert [e.stamp_ns for e in rig.estimates] == [T0 + k * STEP for k in range(5)]
     assert bench.logged(FAULTS[fault]) == 1
     assert rig.node.counters["cycles"] == 2
 

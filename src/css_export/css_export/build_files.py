@@ -6,6 +6,7 @@ from pathlib import Path
 from css_export.bare_metal import machine_flags, run_flags, write_machine
 from css_export.flown import INPUT, OUTPUT, PARAMETERS, STATE
 from css_export.library import Library, MachineCode
+from css_export.operations import at_most
 from css_export.targets import Target
 
 
@@ -84,6 +85,7 @@ def page(library: Library, codes: list[MachineCode]) -> str:
         f"{', '.join(f'`{name}`' for name in c.contents.missing) or '-'} |\n"
         for c in codes
     )
+    bounds = "".join(f"* {c.target.name}: {at_most(c.bound)}.\n" for c in codes)
     loose = sorted({limit.name.partition("[")[0] for limit in library.limits if not limit.declared})
     named = ": " + ", ".join(f"`{name}`" for name in loose) if loose else ""
     return f"""# {prefix}
@@ -130,7 +132,15 @@ What two parameters must be to each other is checked when the mission is read, n
 |---|---:|---:|---:|---|
 {rows}
 All in bytes. The stack is what the compiler lays out for the step and the functions of this library below it; what is
-linked comes to it. Loops are bounded by the numbers of cells and wheels and of fixed tables; no function calls itself.
+linked comes to it. No function calls itself.
+
+## The longest step
+
+{bounds}
+An operation is an instruction of the compiler's intermediate code, after optimisation for the target. The longest way
+through the code is taken, with each loop as often as its numbers allow, be there an input that takes it or not. What a
+function that is linked does comes to it. Whole numbers of the parameters are taken within their limits, those without
+limits as the mission has them.
 
 ## `{prefix}_main.c`
 

@@ -19,9 +19,10 @@ from css_export.entry import Compiled, Interface, Native, compile_function
 from css_export.flown import MEMORY, PARAMETERS, STATE, Function
 from css_export.header import header_text
 from css_export.layout import layout_number, pack
-from css_export.limits import Limit, limits_of
+from css_export.limits import Limit, limits_of, whole_numbers
 from css_export.machine_code import Built, built
 from css_export.names import prefix_of
+from css_export.operations import NOT_ASKED, Bound, bound_of
 from css_export.shipped_mathematics import EXACT, NAME, notice, with_mathematics
 from css_export.targets import Target
 
@@ -36,6 +37,8 @@ class MachineCode:
 
     Attributes:
         stack: [bytes] of the step, without that of the functions that are linked.
+        bound: operations of the step at most.
+        text: the intermediate code that it was made of, optimised.
     """
 
     target: Target
@@ -43,6 +46,8 @@ class MachineCode:
     archive: bytes
     contents: Contents
     stack: int
+    bound: Bound = NOT_ASKED
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -80,9 +85,15 @@ class Library:
             ExportError: something in it must not fly, or there is no code for such a target.
         """
         made = self._built(target)
-        stack = made.stacks[f"{self.prefix}_step"]
+        step = f"{self.prefix}_step"
         packed = archive({"step.o": made.object})
-        return MachineCode(target, made.object, packed, contents(made.object), stack)
+        bound = bound_of(made.text, step, self._whole_numbers())
+        return MachineCode(target, made.object, packed, contents(made.object), made.stacks[step], bound, made.text)
+
+    def _whole_numbers(self) -> list[tuple[int, int, int]]:
+        struct_ = self.interface.structs[PARAMETERS]
+        p = self.function.sample[self.function.places(PARAMETERS)[0]]
+        return list(whole_numbers(self.limits, pack(struct_, p)))
 
     def _built(self, target: Target) -> Built:
         if self.mathematics == TARGET:

@@ -7,7 +7,7 @@ where the mission's is.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from css_common.schema import Parameter, Table
@@ -40,6 +40,27 @@ def limits_of(layout: Struct, p: Any) -> list[Limit]:
         p: the parameters of the mission.
     """
     return _joined(list(_limits(layout, p, "", 0)))
+
+
+def whole_numbers(limits: Iterable[Limit], data: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
+    """Place [bytes], least and largest value of each whole number and flag of a struct of parameters.
+
+    Of one without limits of a parameter's own it is the value of the mission.
+
+    Args:
+        limits: of the struct.
+        data: that struct with the values of the mission.
+    """
+    for limit in limits:
+        size = {WHOLE: 8, FLAG: 1}.get(limit.kind, 0)
+        for at in range(limit.offset, limit.offset + size * limit.count, size or 1):
+            if limit.kind == FLAG:
+                yield at, 0, 1
+            elif limit.declared:
+                yield at, math.ceil(limit.low), math.floor(limit.high)
+            else:
+                value = int.from_bytes(data[at : at + size], "little", signed=True)
+                yield at, value, value
 
 
 def _limits(layout: Layout, value: Any, name: str, at: int) -> Iterator[Limit]:

@@ -43,10 +43,12 @@ class Built:
     Attributes:
         object: an ELF file.
         stacks: [bytes] that each function of it needs with those of it that it calls, without what is linked.
+        text: the intermediate code that it was made of, optimised.
     """
 
     object: bytes
     stacks: dict[str, int]
+    text: str
 
 
 def built(name: str, texts: Iterable[str], exported: Iterable[str], target: Target) -> Built:
@@ -75,7 +77,7 @@ def built(name: str, texts: Iterable[str], exported: Iterable[str], target: Targ
     if "refused" in answer:
         raise ExportError(answer["refused"])
     frames = {function: int(size) for size, function in _WARNED.findall(said)}
-    return Built(bytes.fromhex(answer["object"]), _stacks(frames, answer["calls"]))
+    return Built(bytes.fromhex(answer["object"]), _stacks(frames, answer["calls"]), answer["text"])
 
 
 def _stacks(frames: Mapping[str, int], calls: Mapping[str, list[str]]) -> dict[str, int]:
@@ -103,7 +105,9 @@ def _emitted(asked: dict[str, Any]) -> dict[str, Any]:
         for function in told.functions
         if not function.is_declaration
     }
-    return {"object": machine.emit_object(told).hex(), "calls": calls}
+    # before machine code is made of it, which changes it
+    text = str(told)
+    return {"object": machine.emit_object(told).hex(), "calls": calls, "text": text}
 
 
 def refuse(name: str, text: str, before: Iterable[str] = ()) -> None:

@@ -113,3 +113,13 @@ def quoted(text: str) -> str:
 def comment(text: str) -> str:
     """A text as it may stand in a comment of C."""
     return text.encode("ascii", "replace").decode().replace("*/", "* /").replace("\\", "/").replace("??", "?")
+
+
+def of_python(symbol: str) -> str:
+    """The function of Python that a symbol of numba's is of, by its module; of another symbol that itself."""
+    found, rest = [], symbol.removeprefix("_ZN") if symbol.startswith("_ZN") else ""
+    while length := re.match(r"\d+", rest):
+        end = length.end() + int(length[0])
+        found.append(rest[length.end() : end])
+        rest = rest[end:]
+    return ".".join(found).removeprefix("_3cdynamic_3e.") or symbol

@@ -10,6 +10,7 @@ from rich.console import Console
 
 from css_analysis.readable_table import ReadableTable
 from css_export.library import MUSL, Library, MachineCode
+from css_export.operations import OPERATIONS, Cost, at_most
 from css_export.verification import Verdict
 
 # relative difference of outputs over a flight below which the last bits of mathematics are taken for its reason
@@ -29,10 +30,22 @@ class Row:
     time_ratio: float | None = None  # of a step here, over that of the kernel that the nodes call
     messages: int | None = None  # of the component over the recording, as made anew
     as_recorded: int | None = None  # of them, those that are the bytes in the recording
+    counted: Cost | None = None  # the most operations and calls over the steps, where this machine takes the code
+
+    @property
+    def is_within_bound(self) -> bool:
+        """No step has made more operations, or calls, than it can at most."""
+        bound, counted = self.code.bound, self.counted
+        if bound.operations is None or counted is None:
+            return True
+        most = {OPERATIONS: bound.operations, **bound.calls}
+        return all(count <= most.get(kind, 0) for kind, count in counted.items())
 
     @property
     def is_right(self) -> bool:
         """Every step is equal but for the last bits of named functions, or cannot be compared on any machine."""
+        if not self.is_within_bound:
+            return False
         if self.verdict is None:
             return self.why_not is None or not self.code.target.runs
         traced = bool(self.differing) and self.verdict.largest_relative_difference < _LAST_BITS
@@ -75,6 +88,7 @@ def print_report(
         _print_flight(console, next(row for row in rows if row.library is library))
         for row in rows:
             if row.library is library:
+                console.print(_bounded(row), soft_wrap=True)
                 linked = ", ".join(row.code.contents.missing) or "nothing"
                 console.print(f"{library.function.name} on {row.code.target.name} links {linked}", soft_wrap=True)
     for name, reason in missing.items():
@@ -98,6 +112,15 @@ def _effort(row: Row) -> str:
         counted = "with those of what is linked, counted in forties"
         return f"{where}: {row.instructions} instructions in the longest of these steps, {counted}"
     return f"{where}: a step takes {row.time_ratio:.2f} of the time of the kernel that the node calls"
+
+
+def _bounded(row: Row) -> str:
+    """How many operations a step makes at most, and how many those of the flight made."""
+    told = f"{row.library.function.name} on {row.code.target.name}: {at_most(row.code.bound)}"
+    if row.counted is None:
+        return told
+    told += f"; the longest of these steps made {row.counted[OPERATIONS]}"
+    return told if row.is_within_bound else f"{told}, or more calls of a function: the bound is wrong"
 
 
 def _print_flight(console: Console, row: Row) -> None:
@@ -149,6 +172,10 @@ def result(row: Row) -> dict[str, Any]:
         "not_run": row.why_not,
         "differing_functions": row.differing,
         "most_instructions": row.instructions,
+        "operations_at_most": row.code.bound.operations,
+        "calls_at_most": row.code.bound.calls,
+        "not_bounded": row.code.bound.reason or None,
+        "operations_counted": None if row.counted is None else row.counted[OPERATIONS],
         "time_to_kernel": row.time_ratio,
         "mathematics": row.library.mathematics,
         "messages": row.messages,

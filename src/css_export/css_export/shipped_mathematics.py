@@ -26,7 +26,8 @@ RELEASE = "0.13.0"
 NAME = f"musl of ziglang {RELEASE}"
 INSTALL = './sunpoint shell -c "uv pip install -r requirements-export.lock"'
 
-_PREFIX = "sunpoint.math."
+PREFIX = "sunpoint.math."
+"""With which the names of shipped functions begin."""
 _INSTRUCTIONS = frozenset(
     ["ceil", "copysign", "fabs", "floor", "fma", "nearbyint", "rint", "round", "roundeven", "sqrt", "trunc"]
 )
@@ -96,7 +97,7 @@ def _redirected(text: str, taken: frozenset[str], wanted: set[str]) -> str:
         vector = _VECTOR.search(kind)
         count = found[4].count(",") + 1
         scalar = vector[2] if vector else kind.split()[-1]
-        ours = f"{_PREFIX}{single}"
+        ours = f"{PREFIX}{single}"
         added[ours] = f"declare {scalar} @{ours}({', '.join([scalar] * count)})\n"
         old = f"llvm.{name}{suffix}" if suffix else name
         names[old] = ours
@@ -136,7 +137,7 @@ def _closure(wanted: set[str], left: frozenset[str]) -> list[str]:
     def ours(found: re.Match[str]) -> str:
         name = found[1]
         if name not in left:
-            return f"@{_PREFIX}{name}"
+            return f"@{PREFIX}{name}"
         return f"@llvm.{name}.f64" if name in _INSTRUCTIONS else found[0]
 
     texts: dict[str, str] = {}

@@ -55,12 +55,12 @@ def time_ratio(library: Library, file: Path, calls: Calls) -> float | None:
     if not inputs:
         return None
     function = library.function
-    fresh = _place(pack(structs[STATE], state_values(function, function.sample)))
-    p = _place(pack(structs[PARAMETERS], function.sample[function.places(PARAMETERS)[0]]))
-    given, written = _place(inputs), _place(bytes(structs[OUTPUT].size))
+    fresh = struct_at(pack(structs[STATE], state_values(function, function.sample)))
+    p = struct_at(pack(structs[PARAMETERS], function.sample[function.places(PARAMETERS)[0]]))
+    given, written = struct_at(inputs), struct_at(bytes(structs[OUTPUT].size))
     step = getattr(ctypes.CDLL(str(file.absolute())), f"{library.prefix}_step")
     addresses = {"library": ctypes.cast(step, ctypes.c_void_p).value, "kernel": library.native.address}
-    engine = _compiled()
+    engine = engine_of("".join(_LOOP.format(name=name, call=call) for name, call in _CALLS.items()))
     loop = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 5, *[ctypes.c_int64] * 2)
     loops = {name: loop(engine.get_function_address(name)) for name in _CALLS}
     shortest = dict.fromkeys(_CALLS, float("inf"))
@@ -75,15 +75,15 @@ def time_ratio(library: Library, file: Path, calls: Calls) -> float | None:
     return shortest["library"] / shortest["kernel"]
 
 
-def _place(data: bytes | bytearray) -> np.ndarray:
+def struct_at(data: bytes | bytearray) -> np.ndarray:
     """A copy that begins where any struct may."""
     return np.frombuffer(bytes(data) + bytes(-len(data) % 8 + 8), np.uint64).copy()
 
 
-def _compiled() -> llvm.ExecutionEngine:
+def engine_of(text: str) -> llvm.ExecutionEngine:
+    """Machine code of a module of intermediate code, in this process."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    text = "".join(_LOOP.format(name=name, call=call) for name, call in _CALLS.items())
     machine = llvm.Target.from_default_triple().create_target_machine()
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(text), machine)
     engine.finalize_object()

@@ -15,12 +15,14 @@ from css_common.kernel import kernel
 from css_common.mission import load_mission, mission_from_text
 from css_export import mathematics
 from css_export.c_main import STEP, word
+from css_export.counted_operations import counted
 from css_export.elf import Contents, contents
 from css_export.errors import ExportError
 from css_export.flown import INPUT, PARAMETERS, STATE, Function, flying_functions
 from css_export.layout import leaves, other_order, pack
 from css_export.library import MachineCode, made_library, write_library
 from css_export.machine_code import built
+from css_export.operations import OPERATIONS, Bound
 from css_export.programs import compiled_object, compiled_program, run_program, shared_library, why_not
 from css_export.recorded_calls import Calls, listen
 from css_export.report import Row
@@ -92,6 +94,17 @@ def test_other_parameters_give_other_bits(exported):
     assert verdict.steps == STEPS
     assert verdict.equal < STEPS
     assert verdict.largest_relative_difference > 0.0
+
+
+def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported):
+    library, _, calls = exported
+    code = library.for_target(HOST)
+    assert code.bound.operations is not None, code.bound.reason
+    made = list(counted(library, code.text, calls))
+    assert len(made) == STEPS
+    for cost in made:
+        assert 0 < cost.pop(OPERATIONS) <= code.bound.operations
+        assert all(count <= code.bound.calls[name] for name, count in cost.items())
 
 
 @with_compiler
@@ -346,4 +359,14 @@ def test_another_mathematics_is_named(tmp_path, monkeypatch):
 def test_a_difference_has_to_be_small_and_of_a_named_function(equal, largest, differing, right):
     code = MachineCode(HOST, b"", b"", Contents(0, 0, 0, ()), 0)
     row = Row(cast(Any, None), code, Verdict(10, equal, equal, largest), None, differing)
+    assert row.is_right is right
+
+
+@pytest.mark.parametrize(
+    ("counted_of_steps", "right"),
+    [({OPERATIONS: 7, "sin": 2}, True), ({OPERATIONS: 8, "sin": 2}, False), ({OPERATIONS: 7, "sin": 3}, False)],
+)
+def test_a_step_that_makes_more_than_it_can_is_no_proof(counted_of_steps, right):
+    code = MachineCode(HOST, b"", b"", Contents(0, 0, 0, ()), 0, Bound(7, {"sin": 2}))
+    row = Row(cast(Any, None), code, Verdict(10, 10, 10), counted=counted_of_steps)
     assert row.is_right is right

@@ -93,14 +93,16 @@ def lit_cells(layout: CellLayout, gate: Gate, voltages, top: int) -> tuple[bool,
 def _with_dim_cells(layout: CellLayout, level: float, voltages, mask: int) -> int:
     """The mask with the cells above `level` that share a part of the sky with each one in it, the brighter first."""
     asked = mask
-    while True:
+    # each round asks one cell
+    for _ in range(voltages.shape[0]):
         next_one = -1
         brightest_left = level
         for i in range(voltages.shape[0]):
             if asked >> i & 1 == 0 and brightest_left < voltages[i] < READABLE:
                 next_one, brightest_left = i, voltages[i]
         if next_one < 0:
-            return mask
+            break
         asked |= 1 << next_one
         if share_view(layout, next_one, mask):
             mask |= 1 << next_one
+    return mask

@@ -29,9 +29,12 @@ def add_vector(root, size: int, v) -> None:
         v: (>= size,), spent.
     """
     for k in range(size):
-        r = math.hypot(root[k, k], v[k])
-        if r == 0.0:
+        if root[k, k] == 0.0 and v[k] == 0.0:
             continue
+        # the length by IEEE 754's own operations: of `hypot` C libraries give different last bits
+        largest = max(abs(root[k, k]), abs(v[k]))
+        x, y = root[k, k] / largest, v[k] / largest
+        r = largest * math.sqrt(x * x + y * y)
         c, s = root[k, k] / r, v[k] / r
         root[k, k] = r
         for i in range(k + 1, size):

@@ -16,6 +16,7 @@ from css_estimation.sun.lit_cells import Gate, lit_cells
 
 # Directions on the sphere, 1.4 deg apart.
 _DIRECTIONS = 20_000
+_HALVINGS = _DIRECTIONS.bit_length()
 
 PATTERN = np.dtype(
     [("mask", np.int64)] + [(name, np.float64) for name in ("x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")],
@@ -72,7 +73,10 @@ def sun_patterns(layout: CellLayout, gate: Gate) -> np.ndarray:
 def find_pattern(patterns, mask: int) -> int:
     """Index of a set of cells in the table; -1: no direction of the Sun gives it."""
     low, high = 0, patterns.shape[0]
-    while low < high:
+    # each round halves what is left of a table, which has no more rows than there are directions
+    for _ in range(_HALVINGS):
+        if low >= high:
+            break
         middle = (low + high) // 2
         if patterns[middle].mask < mask:
             low = middle + 1

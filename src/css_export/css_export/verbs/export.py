@@ -11,6 +11,7 @@ from typing import Any
 
 from css_common.mission import Mission, load_mission, mission_from_text
 from css_export.build_files import write_build_files
+from css_export.counted_operations import most_counted
 from css_export.errors import ExportError, ToolError
 from css_export.flown import flying_functions, functions_of, left_out
 from css_export.glue import write_glue
@@ -119,6 +120,8 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
                 shared = place / HOST / f"lib{library.prefix}.so"
                 if row.code.target.name == HOST and shared.is_file():
                     row.time_ratio = time_ratio(library, shared, calls)
+                if row.code.target.name == HOST and calls.steps and row.code.bound.operations is not None:
+                    row.counted = most_counted(library, row.code.text, calls)
                 if row.verdict.equal != row.verdict.steps:
                     row.differing = differing_functions(row.code.contents.missing, row.code.target, place)
             except ToolError as error:
