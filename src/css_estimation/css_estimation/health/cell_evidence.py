@@ -14,6 +14,7 @@ from css_common.health import (
     EVIDENCE_RANGE,
     EVIDENCE_RESIDUAL,
     EVIDENCE_STUCK,
+    KIND_DEAD,
     KIND_SWAPPED,
     hold,
     release,
@@ -75,10 +76,26 @@ def _leave_out(
     since_step: int,
 ) -> None:
     cell = memory.cells[i]
+    _hold(memory, i, kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
+
+
+@kernel
+def hold_for_dead(
+    memory: CellHealthMemory, i: int, evidence: int, statistic: float, threshold: float, since_step: int
+) -> None:
+    """Leaves a cell out that gives nothing."""
+    _hold(memory, i, KIND_DEAD, evidence, statistic, threshold, since_step)
+
+
+@kernel
+def _hold(
+    memory: CellHealthMemory, i: int, kind: int, evidence: int, statistic: float, threshold: float, since_step: int
+) -> None:
+    cell = memory.cells[i]
     cell.good, cell.sure = 0.0, 0
     cell.times = min(cell.times + 1, _MOST_TIMES)
     memory.changes[0] += 1
-    hold(memory.verdicts[i], kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
+    hold(memory.verdicts[i], kind, evidence, statistic, threshold, since_step)
 
 
 @kernel
@@ -87,6 +104,19 @@ def _begin_sums(memory: CellHealthMemory, i: int) -> None:
     memory.swap_looks[i] = 0.0
     for j in range(memory.cells.shape[0]):
         memory.swaps[i, j] = 0.0
+
+
+@kernel
+def begin_evidence(memory: CellHealthMemory, i: int, step: int) -> None:
+    """Something begins to speak against a cell."""
+    memory.cells[i].first_step = step
+    _begin_sums(memory, i)
+
+
+@kernel
+def drop_evidence(memory: CellHealthMemory, i: int) -> None:
+    """Forgets what has begun to speak against a cell."""
+    memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
 
 
 @kernel
@@ -102,7 +132,7 @@ def trust_again(memory: CellHealthMemory, i: int) -> None:
 def forget_scores(memory: CellHealthMemory) -> None:
     """The direction was wrong: forgets what has begun to speak against cells for its sake."""
     for i in range(memory.cells.shape[0]):
-        memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
+        drop_evidence(memory, i)
 
 
 @kernel
@@ -115,8 +145,7 @@ def _add_score(
     if cell.score == 0.0:
         cell.first_step = -1
     elif cell.first_step < 0:
-        cell.first_step = step
-        _begin_sums(memory, i)
+        begin_evidence(memory, i, step)
     return cell.score > p.threshold
 
 
