@@ -41,17 +41,31 @@ class Body:
         self.edge = math.cos(math.radians(0.5 * view_deg))
         self.random = np.random.default_rng(seed)
         self.gyro, self.sky, self.light, self.time = gyro, UNKNOWN_SKY, 1.0, 0.0
+        self.earth, self.earth_light = np.array([0.0, 0.0, -1.0]), 0.0
+        self.true_normals, self.gains = self.normals, np.ones(len(self.normals))
+
+    def uncalibrated(self):
+        """Gains that err by 2 % and normals that err by 1 deg about each axis, 1 sigma, and light of the Earth."""
+        shape = self.normals.shape
+        tilted = self.normals + np.cross(np.radians(1.0) * self.random.standard_normal(shape), self.normals)
+        self.true_normals = tilted / np.linalg.norm(tilted, axis=1)[:, np.newaxis]
+        self.gains = 1.0 + 0.02 * self.random.standard_normal(shape[0])
+        self.earth_light = 0.25
+        return self
 
     def outputs(self):
-        cosines = self.normals @ self.sun
+        cosines = self.true_normals @ self.sun
         lit = np.where(cosines >= self.edge, np.maximum(cosines, 0.0), 0.0)
+        lit += self.earth_light * np.maximum(self.true_normals @ self.earth, 0.0) ** 2
+        lit *= self.gains
         return np.maximum(self.light * lit + NOISE * self.random.standard_normal(len(cosines)), 0.0)
 
     def fly(self, seconds, spoil=lambda v, t: v):
         """The mask of cells that were ever held for failed, and the time of the first."""
         ever, first = 0, math.nan
         for _ in range(round(seconds / PERIOD)):
-            self.sun = np.array(to_dcm(tuple((PERIOD * self.omega).tolist()))) @ self.sun
+            turn = np.array(to_dcm(tuple((PERIOD * self.omega).tolist())))
+            self.sun, self.earth = turn @ self.sun, turn @ self.earth
             self.time += PERIOD
             v = np.array(spoil(self.outputs(), self.time), dtype=np.float64)
             source = RATE_GYRO if self.gyro else RATE_NONE

@@ -33,8 +33,9 @@ from css_estimation.health.cell_memory import (
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.cell_signals import signal_of, statistic_of
 
-_FREE = 4.0  # squared sigmas that a healthy cell is off
-_MOST_SCORE = 60.0
+FREE = 4.0
+"""Squared sigmas that a healthy cell is off."""
+MOST_SCORE = 60.0
 _DEAD = 0.05
 _AGREES = 6.0  # squared sigmas
 SHOWS = 0.3
@@ -116,7 +117,8 @@ def begin_evidence(memory: CellHealthMemory, i: int, step: int) -> None:
 @kernel
 def drop_evidence(memory: CellHealthMemory, i: int) -> None:
     """Forgets what has begun to speak against a cell."""
-    memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
+    cell = memory.cells[i]
+    cell.score, cell.first_step = 0.0, -1
 
 
 @kernel
@@ -124,8 +126,9 @@ def trust_again(memory: CellHealthMemory, i: int) -> None:
     """Uses a cell as if nothing had been."""
     release(memory.verdicts[i])
     memory.changes[0] += 1
+    drop_evidence(memory, i)
     cell = memory.cells[i]
-    cell.score, cell.first_step, cell.same = 0.0, -1, 0.0
+    cell.same = cell.vote = cell.opposite = 0.0
 
 
 @kernel
@@ -141,7 +144,7 @@ def _add_score(
 ) -> bool:
     """Adds squared sigmas that a cell was off for `window` [s] to its score; whether that is beyond the threshold."""
     cell = memory.cells[i]
-    cell.score = min(max(0.0, cell.score + (squared - _FREE) * window), _MOST_SCORE)
+    cell.score = min(max(0.0, cell.score + (squared - FREE) * window), MOST_SCORE)
     if cell.score == 0.0:
         cell.first_step = -1
     elif cell.first_step < 0:
@@ -186,6 +189,22 @@ def score_cells(
 
 
 @kernel
+def leave_out_by(
+    p: CellHealthParameters,
+    memory: CellHealthMemory,
+    i: int,
+    evidence: int,
+    statistic: float,
+    threshold: float,
+    since_step: int,
+) -> None:
+    """Leaves a cell out by what other cells read, whatever the direction to the Sun."""
+    _begin_sums(memory, i)
+    memory.used[i] = math.nan
+    _leave_out(p, memory, i, evidence, statistic, threshold, since_step)
+
+
+@kernel
 def _judge_on(
     p: CellHealthParameters, memory: CellHealthMemory, i: int, output: float, e: Expected, off: float, window: float
 ) -> None:
@@ -216,7 +235,8 @@ def leave_out(
 ) -> None:
     """Leaves a cell out for what the others read."""
     cell = memory.cells[i]
-    evidence = EVIDENCE_DEAD if cell.read < _DEAD * max(cell.cycles, 1.0) else EVIDENCE_RESIDUAL
+    mean = cell.read / cell.cycles if cell.cycles > 0.0 else memory.means[i]
+    evidence = EVIDENCE_DEAD if mean < _DEAD else EVIDENCE_RESIDUAL
     since = cell.first_step if cell.first_step >= 0 else step
     _leave_out(p, memory, i, evidence, statistic, threshold, since)
 

@@ -37,6 +37,7 @@ from css_estimation.health.cell_memory import (
 )
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.cell_signals import in_range, note_outputs
+from css_estimation.health.cell_votes import judge_votes
 from css_estimation.health.common_darkness import (
     LATE,
     follow_light_of_day,
@@ -134,6 +135,7 @@ def _look(
             top = mean
         if used and mean > SHOWS:
             bright += 1
+    judge_votes(p, memory, track, min(window, MOST_AT_ONCE), step)
     darkness = judge_darkness(p, memory, track, darkness, window, rate_sure, step)
     darkness = judge_lasting_darkness(p, memory, darkness, window, top > p.minimum, sky, step)
     # one cell that is bright in the shadow fails; of several, the model of the orbit does

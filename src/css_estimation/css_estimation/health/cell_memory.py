@@ -29,6 +29,10 @@ WATCHED = np.dtype(
         ("score", np.float64),  # contradiction by the other cells
         ("first_step", np.int64),  # when that began; -1: there is none
         ("sure", np.int64),  # 1: left out while the direction had been sure for long
+        ("vote", np.float64),  # contradiction by those that look the same way
+        ("vote_step", np.int64),  # when that began
+        ("opposite", np.float64),  # by those that look another way
+        ("opposite_step", np.int64),
         ("good", np.float64),  # [s] of agreement since it was left out
         ("times", np.int64),  # that it was left out
         # what tells kinds apart: all over the cycles since the first evidence
