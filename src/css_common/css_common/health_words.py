@@ -24,7 +24,7 @@ EVIDENCE_WORDS = {
     Health.EVIDENCE_RESIDUAL: "all others together say otherwise",
     Health.EVIDENCE_DRIFT: "small contradictions of one sign add up",
     Health.EVIDENCE_DARK: "it reads light in the shadow of the Earth",
-    Health.EVIDENCE_COMMON: "it failed together with all others of its board",
+    Health.EVIDENCE_COMMON: "it went dark together with all others that should see the Sun",
     Health.EVIDENCE_SUN: "the motion of the Sun says otherwise",
     Health.EVIDENCE_FIELD: "the magnetic field says otherwise",
     Health.EVIDENCE_MOMENTUM: "the speeds of the wheels say otherwise",

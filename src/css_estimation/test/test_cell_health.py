@@ -5,74 +5,11 @@ import math
 
 import numpy as np
 import pytest
+from turning_body import PERIOD, RING, SIX, TWELVE, Body, to_dcm, with_cell
 
 from css_common import health
-from css_common.attitude import rotation_vector_to_dcm
-from css_common.kernel import typed_call
-from css_common.schema import default_values
-from css_estimation.health import cell_health, cell_memory, cell_options
-from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, UNKNOWN_SKY
-from css_sensors.cells import CELLS
-
-PERIOD = 0.1
-RING = [[math.cos(a) * 0.7071, math.sin(a) * 0.7071, z] for z in (0.7071, -0.7071) for a in np.arange(4) * math.pi / 2]
-SIX = [[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
-_GOLDEN = 0.5 * (1.0 + math.sqrt(5.0))
-TWELVE = [
-    list(np.roll([0.0, a, b], k)) for k in range(3) for a in (1.0, -1.0) for b in (_GOLDEN, -_GOLDEN)
-]  # corners of an icosahedron: every direction is seen by several cells
-NOISE = 0.005
-_to_dcm = typed_call(rotation_vector_to_dcm)
-_watch = typed_call(cell_health.watch_cells)
-
-
-class Body:
-    """Cells of a body that turns evenly in the Sun, without the Earth, and what their health makes of them."""
-
-    def __init__(self, normals=RING, view_deg=120.0, seed=1, gyro=True, **changes):
-        self.normals = np.array(normals, dtype=np.float64)
-        self.normals /= np.linalg.norm(self.normals, axis=1)[:, np.newaxis]
-        shape = {"cells__normals": self.normals.ravel(), "cells__field_of_view_deg": view_deg}
-        values = default_values(CELLS + cell_options.PARAMETERS, **shape, **changes)
-        self.p = cell_options.parameters(values)
-        self.memory = cell_memory.new_memory(len(self.normals))
-        self.state = cell_health.initial_state()
-        self.omega = np.radians([1.1, -0.7, 0.4])
-        self.sun = np.array([0.35, 0.2, 0.9]) / np.linalg.norm([0.35, 0.2, 0.9])
-        self.edge = math.cos(math.radians(0.5 * view_deg))
-        self.random = np.random.default_rng(seed)
-        self.gyro, self.sky, self.light, self.time = gyro, UNKNOWN_SKY, 1.0, 0.0
-
-    def outputs(self):
-        cosines = self.normals @ self.sun
-        lit = np.where(cosines >= self.edge, np.maximum(cosines, 0.0), 0.0)
-        return np.maximum(self.light * lit + NOISE * self.random.standard_normal(len(cosines)), 0.0)
-
-    def fly(self, seconds, spoil=lambda v, t: v):
-        """The mask of cells that were ever held for failed, and the time of the first."""
-        ever, first = 0, math.nan
-        for _ in range(round(seconds / PERIOD)):
-            self.sun = np.array(_to_dcm(tuple((PERIOD * self.omega).tolist()))) @ self.sun
-            self.time += PERIOD
-            v = np.array(spoil(self.outputs(), self.time), dtype=np.float64)
-            source = RATE_GYRO if self.gyro else RATE_NONE
-            omega = tuple(self.omega.tolist()) if self.gyro else (0.0, 0.0, 0.0)
-            self.state = _watch(self.p, self.state, self.memory, PERIOD, v, omega, source, self.sky)
-            if self.state.isolated and not ever:
-                first = self.time
-            ever |= self.state.isolated
-        return ever, first
-
-    def verdict(self, i):
-        return next(verdict for verdict in health.verdicts_of(self.memory.verdicts) if verdict.unit == i)
-
-
-def with_cell(i, value):
-    def spoil(v, t):
-        v[i] = value(v[i], t)
-        return v
-
-    return spoil
+from css_estimation.health import cell_health
+from css_estimation.sun.sun_heading import UNKNOWN_SKY
 
 
 @pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no rate"])
@@ -111,7 +48,7 @@ def test_a_cell_that_fails_is_found_and_named(kind, i):
     lit = body.normals[i]
     # begins anew such that the cell is in the Sun when it fails
     body.sun = lit * 0.9 + 0.2 * np.array([0.3, -0.5, 0.4])
-    body.sun = np.array(_to_dcm(tuple((-25.0 * body.omega).tolist()))) @ (body.sun / np.linalg.norm(body.sun))
+    body.sun = np.array(to_dcm(tuple((-25.0 * body.omega).tolist()))) @ (body.sun / np.linalg.norm(body.sun))
     body.state = cell_health.initial_state()
     assert body.fly(25.0)[0] == 0
     ever, first = body.fly(140.0, with_cell(i, lambda v, t: value(v, t - 25.0)))
@@ -127,7 +64,7 @@ def test_a_dead_cell_of_few_is_found(i):
     body = Body(seed=i)
     body.fly(60.0)
     body.sun = 0.9 * body.normals[i] + 0.2 * np.array([0.3, -0.5, 0.4])
-    body.sun = np.array(_to_dcm(tuple((-25.0 * body.omega).tolist()))) @ (body.sun / np.linalg.norm(body.sun))
+    body.sun = np.array(to_dcm(tuple((-25.0 * body.omega).tolist()))) @ (body.sun / np.linalg.norm(body.sun))
     body.state = cell_health.initial_state()
     body.fly(25.0)
     ever, _ = body.fly(140.0, with_cell(i, lambda v, t: 0.0))

@@ -14,6 +14,7 @@ from css_common.health import (
     EVIDENCE_RANGE,
     EVIDENCE_RESIDUAL,
     EVIDENCE_STUCK,
+    KIND_DEAD,
     KIND_SWAPPED,
     hold,
     release,
@@ -32,8 +33,9 @@ from css_estimation.health.cell_memory import (
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.cell_signals import signal_of, statistic_of
 
-_FREE = 4.0  # squared sigmas that a healthy cell is off
-_MOST_SCORE = 60.0
+FREE = 4.0
+"""Squared sigmas that a healthy cell is off."""
+MOST_SCORE = 60.0
 _DEAD = 0.05
 _AGREES = 6.0  # squared sigmas
 SHOWS = 0.3
@@ -75,10 +77,26 @@ def _leave_out(
     since_step: int,
 ) -> None:
     cell = memory.cells[i]
+    _hold(memory, i, kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
+
+
+@kernel
+def hold_for_dead(
+    memory: CellHealthMemory, i: int, evidence: int, statistic: float, threshold: float, since_step: int
+) -> None:
+    """Leaves a cell out that gives nothing."""
+    _hold(memory, i, KIND_DEAD, evidence, statistic, threshold, since_step)
+
+
+@kernel
+def _hold(
+    memory: CellHealthMemory, i: int, kind: int, evidence: int, statistic: float, threshold: float, since_step: int
+) -> None:
+    cell = memory.cells[i]
     cell.good, cell.sure = 0.0, 0
     cell.times = min(cell.times + 1, _MOST_TIMES)
     memory.changes[0] += 1
-    hold(memory.verdicts[i], kind_of(p, cell, signal_of(cell)), evidence, statistic, threshold, since_step)
+    hold(memory.verdicts[i], kind, evidence, statistic, threshold, since_step)
 
 
 @kernel
@@ -90,19 +108,34 @@ def _begin_sums(memory: CellHealthMemory, i: int) -> None:
 
 
 @kernel
+def begin_evidence(memory: CellHealthMemory, i: int, step: int) -> None:
+    """Something begins to speak against a cell."""
+    memory.cells[i].first_step = step
+    _begin_sums(memory, i)
+
+
+@kernel
+def drop_evidence(memory: CellHealthMemory, i: int) -> None:
+    """Forgets what has begun to speak against a cell."""
+    cell = memory.cells[i]
+    cell.score, cell.first_step = 0.0, -1
+
+
+@kernel
 def trust_again(memory: CellHealthMemory, i: int) -> None:
     """Uses a cell as if nothing had been."""
     release(memory.verdicts[i])
     memory.changes[0] += 1
+    drop_evidence(memory, i)
     cell = memory.cells[i]
-    cell.score, cell.first_step, cell.same = 0.0, -1, 0.0
+    cell.same = cell.vote = cell.opposite = 0.0
 
 
 @kernel
 def forget_scores(memory: CellHealthMemory) -> None:
     """The direction was wrong: forgets what has begun to speak against cells for its sake."""
     for i in range(memory.cells.shape[0]):
-        memory.cells[i].score, memory.cells[i].first_step = 0.0, -1
+        drop_evidence(memory, i)
 
 
 @kernel
@@ -111,12 +144,11 @@ def _add_score(
 ) -> bool:
     """Adds squared sigmas that a cell was off for `window` [s] to its score; whether that is beyond the threshold."""
     cell = memory.cells[i]
-    cell.score = min(max(0.0, cell.score + (squared - _FREE) * window), _MOST_SCORE)
+    cell.score = min(max(0.0, cell.score + (squared - FREE) * window), MOST_SCORE)
     if cell.score == 0.0:
         cell.first_step = -1
     elif cell.first_step < 0:
-        cell.first_step = step
-        _begin_sums(memory, i)
+        begin_evidence(memory, i, step)
     return cell.score > p.threshold
 
 
@@ -157,6 +189,22 @@ def score_cells(
 
 
 @kernel
+def leave_out_by(
+    p: CellHealthParameters,
+    memory: CellHealthMemory,
+    i: int,
+    evidence: int,
+    statistic: float,
+    threshold: float,
+    since_step: int,
+) -> None:
+    """Leaves a cell out by what other cells read, whatever the direction to the Sun."""
+    _begin_sums(memory, i)
+    memory.used[i] = math.nan
+    _leave_out(p, memory, i, evidence, statistic, threshold, since_step)
+
+
+@kernel
 def _judge_on(
     p: CellHealthParameters, memory: CellHealthMemory, i: int, output: float, e: Expected, off: float, window: float
 ) -> None:
@@ -187,7 +235,8 @@ def leave_out(
 ) -> None:
     """Leaves a cell out for what the others read."""
     cell = memory.cells[i]
-    evidence = EVIDENCE_DEAD if cell.read < _DEAD * max(cell.cycles, 1.0) else EVIDENCE_RESIDUAL
+    mean = cell.read / cell.cycles if cell.cycles > 0.0 else memory.means[i]
+    evidence = EVIDENCE_DEAD if mean < _DEAD else EVIDENCE_RESIDUAL
     since = cell.first_step if cell.first_step >= 0 else step
     _leave_out(p, memory, i, evidence, statistic, threshold, since)
 

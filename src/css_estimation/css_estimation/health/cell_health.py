@@ -8,7 +8,8 @@ what speaks against it adds up (`cell_evidence`). Range, leaps and outputs that 
 themselves (`cell_signals`). While the cells are not explained, the search goes on beside: it finds out whether a cell
 is wrong or the direction.
 
-When all that should be lit is dark the Sun sets: that speaks against no cell.
+When all that should be lit is dark the Sun sets: that speaks against no cell, unless the model of the orbit has a Sun
+(`common_darkness`).
 """
 
 import math
@@ -26,20 +27,29 @@ from css_estimation.health.cell_evidence import (
 )
 from css_estimation.health.cell_following import MOST_AT_ONCE, carried, looked
 from css_estimation.health.cell_memory import (
+    NO_DARKNESS,
     PHASE_LOOKING,
     PHASE_SETTLED,
     CellHealthMemory,
     CellHealthState,
+    Darkness,
     Track,
 )
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.cell_signals import in_range, note_outputs
+from css_estimation.health.cell_votes import judge_votes
+from css_estimation.health.common_darkness import (
+    LATE,
+    follow_light_of_day,
+    judge_darkness,
+    judge_lasting_darkness,
+    see_light_again,
+)
 from css_estimation.health.sight import Sight
 from css_estimation.sun.sun_heading import RATE_GYRO, RATE_MOMENTUM, RATE_NONE, Sky
 from css_estimation.symmetric import isotropic, trace
 
 _LOOK = 0.499  # [s]
-_NIGHT = 60.0  # [s] after which the Sun has set however late a model of the orbit is
 _ZERO: Vec3 = (0.0, 0.0, 0.0)
 
 
@@ -54,7 +64,7 @@ def initial_state() -> CellHealthState:
     """Nothing seen yet."""
     covariance = isotropic.py_func(1.0)
     track = Track(PHASE_LOOKING, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), covariance, 1.0, IDENTITY)
-    return CellHealthState(track, _ZERO, 0.0, 0.0, 0, 0, math.inf)
+    return CellHealthState(track, _ZERO, 0.0, 0.0, NO_DARKNESS, 0, 0, math.inf)
 
 
 @kernel
@@ -85,17 +95,17 @@ def watch_cells(
     window, step = state.window + dt, state.step + 1
     track, isolated = state.track, state.isolated
     night = state.night + dt if sky.known and sky.illumination <= 0.0 else 0.0
+    darkness = follow_light_of_day(state.darkness, dt, sky)
     if window > _LOOK or step == 1:
-        track = _look(
-            p, memory, carried(track, turn_b, window, rate_sure), window, rate_sure, step, sky, night > _NIGHT
-        )
+        track = carried(track, turn_b, window, rate_sure)
+        track, darkness = _look(p, memory, track, darkness, window, rate_sure, step, sky, night > LATE)
         isolated = isolated_mask(memory)
         turn_b, window = _ZERO, 0.0
     for i in range(voltages.shape[0]):
         v = voltages[i]
         left_out = memory.verdicts[i].held == 1 or not in_range(p, v)
         memory.trusted[i] = math.nan if left_out else v
-    return CellHealthState(track, turn_b, window, night, step, isolated, least_change)
+    return CellHealthState(track, turn_b, window, night, darkness, step, isolated, least_change)
 
 
 @kernel
@@ -103,12 +113,13 @@ def _look(
     p: CellHealthParameters,
     memory: CellHealthMemory,
     track: Track,
+    darkness: Darkness,
     window: float,
     rate_sure: bool,
     step: int,
     sky: Sky,
     night: bool,
-) -> Track:
+) -> tuple[Track, Darkness]:
     """Judges all cells by what they read since the last look."""
     top, bright = 0.0, 0
     for i in range(memory.cells.shape[0]):
@@ -124,10 +135,15 @@ def _look(
             top = mean
         if used and mean > SHOWS:
             bright += 1
+    judge_votes(p, memory, track, min(window, MOST_AT_ONCE), step)
+    darkness = judge_darkness(p, memory, track, darkness, window, rate_sure, step)
+    darkness = judge_lasting_darkness(p, memory, darkness, window, top > p.minimum, sky, step)
     # one cell that is bright in the shadow fails; of several, the model of the orbit does
     if night and bright < 2:
         judge_in_the_dark(p, memory, min(window, MOST_AT_ONCE), step)
     elif top > p.minimum and (bright > 1 or not (sky.known and sky.illumination < 1.0)):
         track = looked(p, memory, track, window, rate_sure, step)
+    else:
+        darkness = see_light_again(p, memory, darkness, window)
     judge_signals(p, memory, step)
-    return track
+    return track, darkness

@@ -29,6 +29,10 @@ WATCHED = np.dtype(
         ("score", np.float64),  # contradiction by the other cells
         ("first_step", np.int64),  # when that began; -1: there is none
         ("sure", np.int64),  # 1: left out while the direction had been sure for long
+        ("vote", np.float64),  # contradiction by those that look the same way
+        ("vote_step", np.int64),  # when that began
+        ("opposite", np.float64),  # by those that look another way
+        ("opposite_step", np.int64),
         ("good", np.float64),  # [s] of agreement since it was left out
         ("times", np.int64),  # that it was left out
         # what tells kinds apart: all over the cycles since the first evidence
@@ -102,6 +106,22 @@ class Track(NamedTuple):
     frame: Mat3  # from the frame in which directions of the search are fixed to b
 
 
+class Darkness(NamedTuple):
+    """Of all cells together; see `common_darkness`."""
+
+    day: float  # [s] for which the model of the orbit has had all of the Sun
+    waning: float  # [s] since a cell that must see the Sun had most of its light
+    time: float  # [s] for which all that must see the Sun have been dark
+    mask: int  # those cells
+    at_once: bool  # they went dark at once
+    unlit: float  # [s] since a cell was lit, without a model
+    unlit_step: int  # when that was
+    lasting: bool  # it has outlasted all eclipses
+
+
+NO_DARKNESS = Darkness(0.0, 0.0, 0.0, 0, False, 0.0, 0, False)
+
+
 class CellHealthState(NamedTuple):
     """Beside the memory."""
 
@@ -109,6 +129,7 @@ class CellHealthState(NamedTuple):
     turn_b: Vec3  # [rad] since the last look
     window: float  # [s] since the last look
     night: float  # [s] for which the model of the orbit has had no Sun
+    darkness: Darkness
     step: int  # number of this cycle
     isolated: int  # mask
     least_change: float  # [-] smallest change of any output from cycle to cycle: a step of the converter, or less

@@ -77,6 +77,16 @@ class CellHealthParameters(NamedTuple):
     minimum: float = given(
         real(_NAMED + "minimum_output", 0.3, "-", "no Sun unless a cell is above it", low=0.01, high=1.0)
     )
+    longest_eclipse: float = given(
+        real(
+            _NAMED + "longest_eclipse",
+            4500.0,
+            "s",
+            "without a model of the orbit: darkness longer than it is none, but cells that fail together",
+            low=60.0,
+            high=1e6,
+        )
+    )
     gate: float = made(
         square,
         real(_NAMED + "gate_sigma", 3.5, "-", "sigmas beyond which a cell contradicts the others", low=1.0, high=100.0),

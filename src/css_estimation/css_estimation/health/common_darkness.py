@@ -1,0 +1,211 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Cells that go dark together while there is a Sun: a dead board, told from an eclipse and from cells that age.
+
+With a model of the orbit: all cells that must see the Sun are dark, while the model has had all of it for so long that
+it cannot be late any more. The Sun sets in some seconds, as the shortest penumbra of an orbit takes 8 s; a board dies
+from one reading to the next. Darkness that came at once is therefore no late model, and a few seconds of it decide;
+darkness that came slowly has to outlast what a model may be late. Cells that age fade together but give light, and that
+ends it.
+
+Without a model a dead board is an eclipse until no eclipse lasts so long. Then no cell that is dark is believed any
+more, unless the cells leave a part of the sky unseen, where the Sun may be.
+"""
+
+import math
+from typing import NamedTuple
+
+from css_common.health import EVIDENCE_COMMON, EVIDENCE_DEAD
+from css_common.kernel import kernel
+from css_estimation.health.cell_evidence import begin_evidence, drop_evidence, hold_for_dead, trust_again
+from css_estimation.health.cell_expectation import SEEN, SURE, expected
+from css_estimation.health.cell_following import MOST_AT_ONCE
+from css_estimation.health.cell_memory import DIRECTIONS, NO_SIGNAL, PHASE_SETTLED, CellHealthMemory, Darkness, Track
+from css_estimation.health.cell_options import CellHealthParameters
+from css_estimation.health.cell_signals import signal_of
+from css_estimation.sun.cell_layout import cosine_on, sees
+from css_estimation.sun.direction_grid import direction
+from css_estimation.sun.sun_heading import Sky
+
+LATE = 60.0
+"""Time [s] by which a model of the orbit may be late or early about the shadow."""
+_DARK_TIME = 10.0  # [s]
+_AT_ONCE = 1.5  # [s] from most of the light to darkness: three looks
+_MOST_OF_IT = 0.75  # of what a cell should read
+_BACK = 5.0  # [s] of light after which a cell that was dark is used again; twice as long after each time that it failed
+
+
+@kernel
+def follow_light_of_day(darkness: Darkness, dt: float, sky: Sky) -> Darkness:
+    """After a cycle of `dt` [s]."""
+    day = darkness.day + dt if sky.known and sky.illumination >= 1.0 else 0.0
+    d = darkness
+    return Darkness(day, d.waning, d.time, d.mask, d.at_once, d.unlit, d.unlit_step, d.lasting)
+
+
+@kernel
+def _darkest(p: CellHealthParameters) -> float:
+    """Output below which a cell gives nothing [-]."""
+    return math.sqrt(p.gate * (p.floor + p.noise * p.noise))
+
+
+class _Told(NamedTuple):
+    """What the cells that must see the Sun tell."""
+
+    dark: int  # mask of those that give nothing
+    lit: bool  # one of them gives something, or another cell may see the Sun
+    share: float  # largest part of what they should read
+
+
+@kernel
+def _told(p: CellHealthParameters, memory: CellHealthMemory, track: Track) -> _Told:
+    dark, lit, share = 0, False, 0.0
+    darkest = _darkest(p)
+    for i in range(memory.used.shape[0]):
+        output = memory.used[i]
+        if math.isnan(output):
+            continue
+        e = expected(p, i, track.sun_b, track.covariance, track.light, SURE)
+        if output > p.minimum:
+            lit = True
+        # where nothing would be no contradiction, it tells nothing
+        if e.sight == SEEN and e.low * e.low > p.gate * e.variance:
+            share = max(share, output / e.high)
+            memory.cells[i].predicted = e.high
+            if abs(output) < darkest:
+                dark |= 1 << i
+            else:
+                lit = True
+    return _Told(dark, lit, share)
+
+
+@kernel
+def _given_up(memory: CellHealthMemory, darkness: Darkness, waning: float) -> Darkness:
+    """No darkness of all cells, or not any more: what has begun to speak against them is forgotten."""
+    for i in range(memory.cells.shape[0]):
+        if darkness.mask >> i & 1 and memory.verdicts[i].held == 0:
+            drop_evidence(memory, i)
+    d = darkness
+    return Darkness(d.day, waning, 0.0, 0, False, d.unlit, d.unlit_step, d.lasting)
+
+
+@kernel
+def judge_darkness(
+    p: CellHealthParameters,
+    memory: CellHealthMemory,
+    track: Track,
+    darkness: Darkness,
+    window: float,
+    rate_sure: bool,
+    step: int,
+) -> Darkness:
+    """A look at cells that must see the Sun; holds for failed those that have been dark together for long enough.
+
+    Args:
+        track: before the outputs of this look.
+        window: [s] since the look before.
+        rate_sure: a gyro or the wheels tell how the body turns: nothing else does in the dark.
+        step: number of this cycle.
+    """
+    if track.phase != PHASE_SETTLED or not rate_sure or darkness.day <= LATE:
+        return _given_up(memory, darkness, darkness.waning + window)
+    told = _told(p, memory, track)
+    waning = 0.0 if told.share >= _MOST_OF_IT else darkness.waning + window
+    if told.lit:
+        return _given_up(memory, darkness, waning)
+    at_once = darkness.at_once if darkness.mask != 0 else waning <= _AT_ONCE
+    mask = darkness.mask | told.dark
+    for i in range(memory.cells.shape[0]):
+        if told.dark >> i & 1 and memory.cells[i].first_step < 0:
+            begin_evidence(memory, i, step)
+    # while no cell must see the Sun there is nothing to wait for
+    time = darkness.time + (min(window, MOST_AT_ONCE) if told.dark != 0 else 0.0)
+    needed = _DARK_TIME if at_once else LATE + _DARK_TIME
+    if time > needed:
+        _hold_dark(memory, mask, time, needed)
+    d = darkness
+    return Darkness(d.day, waning, time, mask, at_once, d.unlit, d.unlit_step, d.lasting)
+
+
+@kernel
+def _hold_dark(memory: CellHealthMemory, mask: int, time: float, needed: float) -> None:
+    """Holds for failed the cells of a mask that have each been dark for long; several of them failed together."""
+    together = mask & (mask - 1) != 0
+    evidence = EVIDENCE_COMMON if together else EVIDENCE_DEAD
+    for i in range(memory.cells.shape[0]):
+        if mask >> i & 1 == 0:
+            continue
+        verdict = memory.verdicts[i]
+        if verdict.held == 0 and memory.cells[i].seconds > _DARK_TIME:
+            hold_for_dead(memory, i, evidence, time, needed, memory.cells[i].first_step)
+            memory.used[i] = math.nan
+        elif verdict.held == 1 and together and verdict.evidence == EVIDENCE_DEAD:
+            verdict.evidence = EVIDENCE_COMMON
+            memory.changes[0] += 1
+
+
+@kernel
+def judge_lasting_darkness(
+    p: CellHealthParameters, memory: CellHealthMemory, darkness: Darkness, window: float, lit: bool, sky: Sky, step: int
+) -> Darkness:
+    """A look without a model of the orbit: darkness that outlasts all eclipses.
+
+    Args:
+        lit: a cell in use sees light.
+        others: as of `judge_darkness`.
+    """
+    d = darkness
+    if lit or sky.known:
+        return Darkness(d.day, d.waning, d.time, d.mask, d.at_once, 0.0, step, d.lasting and not lit)
+    unlit, unlit_step, lasting = d.unlit + window, d.unlit_step, d.lasting
+    if unlit > p.longest_eclipse and not lasting:
+        if _sees_all(p):
+            for i in range(memory.cells.shape[0]):
+                # a NaN compares false
+                if memory.verdicts[i].held == 0 and abs(memory.used[i]) < _darkest(p):
+                    begin_evidence(memory, i, step)
+                    hold_for_dead(memory, i, EVIDENCE_COMMON, unlit, p.longest_eclipse, unlit_step)
+                    memory.used[i] = math.nan
+            lasting = True
+        else:
+            unlit, unlit_step = 0.0, step
+    return Darkness(d.day, d.waning, d.time, d.mask, d.at_once, unlit, unlit_step, lasting)
+
+
+@kernel
+def _sees_all(p: CellHealthParameters) -> bool:
+    """Whether the Sun lights a cell wherever it stands."""
+    for g in range(DIRECTIONS):
+        sun_b = direction(g, DIRECTIONS)
+        seen = False
+        for i in range(p.layout.cells.shape[0]):
+            in_part = p.screened >> i & 1 == 1
+            if not in_part and sees(p.layout, i, sun_b) and cosine_on(p.layout, i, sun_b) > p.minimum:
+                seen = True
+        if not seen:
+            return False
+    return True
+
+
+@kernel
+def see_light_again(p: CellHealthParameters, memory: CellHealthMemory, darkness: Darkness, window: float) -> Darkness:
+    """A look at cells held for dead while no other sees the Sun: those that give light for long are used again."""
+    d, back = darkness, False
+    for i in range(memory.cells.shape[0]):
+        verdict, cell = memory.verdicts[i], memory.cells[i]
+        if verdict.held == 0 or (verdict.evidence != EVIDENCE_COMMON and verdict.evidence != EVIDENCE_DEAD):
+            continue
+        # a NaN compares false
+        if memory.means[i] > p.minimum and signal_of(cell) == NO_SIGNAL:
+            cell.good += min(window, MOST_AT_ONCE)
+        else:
+            cell.good = 0.0
+        if cell.good >= _BACK * 2.0 ** float(cell.times - 1):
+            trust_again(memory, i)
+            back = True
+    if not (back and d.lasting):
+        return d
+    # there is a Sun, so that the others may as well have been in the shade
+    for i in range(memory.cells.shape[0]):
+        if memory.verdicts[i].held == 1 and memory.verdicts[i].evidence == EVIDENCE_COMMON:
+            trust_again(memory, i)
+    return Darkness(d.day, d.waning, d.time, d.mask, d.at_once, 0.0, d.unlit_step, False)
