@@ -13,7 +13,7 @@ from css_export.code_conditions import Condition, Conditions, swapped
 from css_export.code_loops import Flow, Loop
 from css_export.code_numbers import BINARY, added_number, literal
 from css_export.code_text import NAME, VALUE, Instruction, callee, is_call, parts, plain
-from css_export.range_arithmetic import ANY, Range, binary, casted, intrinsic, joined, narrowed
+from css_export.range_arithmetic import ANY, Range, binary, casted, intrinsic, joined, last_bits, narrowed
 
 _MOST = 10**9  # rounds beyond which a bound is none
 _CAST = re.compile(rf"^((?:[a-z]+ )*)i(\d+) ({VALUE}) to i(\d+)")
@@ -40,15 +40,16 @@ class _Steps(NamedTuple):
 class Ranges:
     """Of one function, for given ranges of its arguments."""
 
-    def __init__(self, flow: Flow, arguments: Mapping[str, Range], loads: Mapping[tuple[str, int], Range]) -> None:
+    def __init__(self, flow: Flow, arguments: Mapping[str, Range], pointer: str, numbers: Mapping[int, Range]) -> None:
         """Takes what is known beforehand.
 
         Args:
             flow: of the function.
             arguments: ranges of those of which something is known.
-            loads: ranges of what is loaded, by the pointer and the bytes behind it.
+            pointer: argument that points to the parameters; "": none does.
+            numbers: ranges of the whole numbers of the parameters, by their places.
         """
-        self._flow, self._arguments, self._loads = flow, arguments, loads
+        self._flow, self._arguments, self.pointer, self._numbers = flow, arguments, pointer, numbers
         self._where: dict[str, tuple[str, Instruction]] = {
             i.result: (name, i) for name in flow.order for i in flow.code.blocks[name].instructions if i.result
         }
@@ -122,7 +123,8 @@ class Ranges:
     def _loaded(self, pointer: str) -> Range:
         place = self._where.get(pointer)
         found = _PLACE.match(place[1].rest) if place and place[1].opcode == "getelementptr" else None
-        return self._loads.get((found[1], int(found[2])) if found else (pointer, 0), ANY)
+        base, at = (found[1], int(found[2])) if found else (pointer, 0)
+        return self._numbers.get(at, ANY) if base == self.pointer else ANY
 
     def _incoming(self, made: Instruction) -> list[tuple[str, str]]:
         """Values that come together, each with the block from which it comes."""
@@ -274,10 +276,20 @@ class Ranges:
         if predicate != "ne":
             return None
         ahead = start.high is not None and end.low is not None and start.high <= end.low
+        hit = step == 1 or (
+            start.low == start.high and start.low % step == 0 and self._is_multiple(condition.other, step)
+        )
         # past the end it would go on until it overflows: the compiler knows that it does not
-        if not (ahead and step == 1) and not (steps.is_sure and (sole or ahead)):
+        if not (ahead and hit) and not (steps.is_sure and (sole or ahead)):
             return None
         return max(0, -((start.low - end.high) // step))
+
+    def _is_multiple(self, value: str, step: int) -> bool:
+        """Whether a number of which the last bits are cleared is one of a number of steps."""
+        made = self._where[value][1] if value in self._where else None
+        found = BINARY.match(made.rest) if made is not None and made.opcode == "and" else None
+        mask = literal(found[4]).low if found else None
+        return mask is not None and (last_bits(mask) + 1) % step == 0
 
     def _steps(self, value: str, loop: Loop) -> _Steps | None:
         """How a value is stepped from round to round."""
