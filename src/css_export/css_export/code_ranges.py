@@ -242,6 +242,7 @@ class Ranges:
 
     def _bound(self, condition: Condition, loop: Loop, sole: bool) -> int | None:
         """How often a condition can hold, round after round, for a value that is stepped."""
+        condition, less = self._unfolded(condition)
         where = self._where.get(condition.other)
         if where is not None and where[0] in loop.blocks:
             return None
@@ -249,7 +250,7 @@ class Ranges:
         if steps is None:
             return 1 if self._is_over_after_one(condition, loop) else self._halvings(condition, loop)
         start = self.of(steps.start, steps.before)
-        start = Range(*(None if end is None else end + steps.offset for end in start))
+        start = Range(*(None if end is None else end + steps.offset - less for end in start))
         end = self.of(condition.other, steps.before)
         predicate, step = condition.predicate, steps.step
         if predicate == "eq" and step != 0:
@@ -276,18 +277,33 @@ class Ranges:
         if predicate != "ne":
             return None
         ahead = start.high is not None and end.low is not None and start.high <= end.low
-        hit = step == 1 or (
-            start.low == start.high and start.low % step == 0 and self._is_multiple(condition.other, step)
-        )
+        ends = steps.start, condition.other
+        hit = (steps.offset - less) % step == 0 and all(self._is_multiple(value, step) for value in ends)
         # past the end it would go on until it overflows: the compiler knows that it does not
         if not (ahead and hit) and not (steps.is_sure and (sole or ahead)):
             return None
         return max(0, -((start.low - end.high) // step))
 
+    def _unfolded(self, condition: Condition) -> tuple[Condition, int]:
+        """Of a difference that is compared with a number: its values compared, the first less that number."""
+        made = self._where[condition.one][1] if condition.one in self._where else None
+        found = BINARY.match(made.rest) if made is not None and made.opcode == "sub" else None
+        number = literal(condition.other).low
+        if found is None or number is None or condition.predicate not in ("eq", "ne"):
+            return condition, 0
+        return Condition(condition.predicate, found[3], found[4]), number
+
     def _is_multiple(self, value: str, step: int) -> bool:
-        """Whether a number of which the last bits are cleared is one of a number of steps."""
+        """Whether a number is one of a number of steps: as it stands, or by the last bits that are cleared of it."""
+        number = literal(value).low
+        if number is not None:
+            return number % step == 0
         made = self._where[value][1] if value in self._where else None
-        found = BINARY.match(made.rest) if made is not None and made.opcode == "and" else None
+        if step == 1 or made is None:
+            return step == 1
+        if (added := added_number(made)) is not None:
+            return added[1] % step == 0 and self._is_multiple(added[0], step)
+        found = BINARY.match(made.rest) if made.opcode == "and" else None
         mask = literal(found[4]).low if found else None
         return mask is not None and (last_bits(mask) + 1) % step == 0
 

@@ -215,6 +215,14 @@ clear:
     assert bound_of(text, "f") == Bound(1 + 8 * 8 + 1 + (1 + 2 + 7 * 2) + 1)
 
 
+def test_a_difference_that_is_compared_with_a_number():
+    text = loop("0", body="  %left = sub i64 %i, 12\n").replace("icmp slt i64 %i, 0", "icmp ne i64 %gone, 3")
+    text = text.replace("  %more = ", "  %gone = sub i64 %i, %twelve\n  %more = ")
+    text = text.replace("entry:\n", "entry:\n  %twelve = and i64 12, -1\n")
+    # 15 rounds of 5 with the body, the head of 3 once more, 2 before and 1 after
+    assert bound_of(text, "f") == Bound(2 + 15 * 6 + 3 + 1)
+
+
 @pytest.mark.parametrize(("step", "bounded"), [(2, True), (4, True), (8, False), (3, False)])
 def test_a_loop_that_the_compiler_unrolled_has_its_rounds(step, bounded):
     """The number of rounds is one of the lengths of its steps, which the code shows by the bits that it clears."""
