@@ -13,7 +13,7 @@ from css_export.code_conditions import Condition, Conditions, swapped
 from css_export.code_loops import Flow, Loop
 from css_export.code_numbers import BINARY, added_number, literal
 from css_export.code_text import NAME, VALUE, Instruction, callee, is_call, parts, plain
-from css_export.range_arithmetic import ANY, Range, binary, casted, intrinsic, joined, narrowed
+from css_export.range_arithmetic import ANY, Range, binary, casted, intrinsic, joined, last_bits, narrowed
 
 _MOST = 10**9  # rounds beyond which a bound is none
 _CAST = re.compile(rf"^((?:[a-z]+ )*)i(\d+) ({VALUE}) to i(\d+)")
@@ -40,15 +40,16 @@ class _Steps(NamedTuple):
 class Ranges:
     """Of one function, for given ranges of its arguments."""
 
-    def __init__(self, flow: Flow, arguments: Mapping[str, Range], loads: Mapping[tuple[str, int], Range]) -> None:
+    def __init__(self, flow: Flow, arguments: Mapping[str, Range], pointer: str, numbers: Mapping[int, Range]) -> None:
         """Takes what is known beforehand.
 
         Args:
             flow: of the function.
             arguments: ranges of those of which something is known.
-            loads: ranges of what is loaded, by the pointer and the bytes behind it.
+            pointer: argument that points to the parameters; "": none does.
+            numbers: ranges of the whole numbers of the parameters, by their places.
         """
-        self._flow, self._arguments, self._loads = flow, arguments, loads
+        self._flow, self._arguments, self.pointer, self._numbers = flow, arguments, pointer, numbers
         self._where: dict[str, tuple[str, Instruction]] = {
             i.result: (name, i) for name in flow.order for i in flow.code.blocks[name].instructions if i.result
         }
@@ -122,7 +123,8 @@ class Ranges:
     def _loaded(self, pointer: str) -> Range:
         place = self._where.get(pointer)
         found = _PLACE.match(place[1].rest) if place and place[1].opcode == "getelementptr" else None
-        return self._loads.get((found[1], int(found[2])) if found else (pointer, 0), ANY)
+        base, at = (found[1], int(found[2])) if found else (pointer, 0)
+        return self._numbers.get(at, ANY) if base == self.pointer else ANY
 
     def _incoming(self, made: Instruction) -> list[tuple[str, str]]:
         """Values that come together, each with the block from which it comes."""
@@ -240,6 +242,7 @@ class Ranges:
 
     def _bound(self, condition: Condition, loop: Loop, sole: bool) -> int | None:
         """How often a condition can hold, round after round, for a value that is stepped."""
+        condition, less = self._unfolded(condition)
         where = self._where.get(condition.other)
         if where is not None and where[0] in loop.blocks:
             return None
@@ -247,7 +250,7 @@ class Ranges:
         if steps is None:
             return 1 if self._is_over_after_one(condition, loop) else self._halvings(condition, loop)
         start = self.of(steps.start, steps.before)
-        start = Range(*(None if end is None else end + steps.offset for end in start))
+        start = Range(*(None if end is None else end + steps.offset - less for end in start))
         end = self.of(condition.other, steps.before)
         predicate, step = condition.predicate, steps.step
         if predicate == "eq" and step != 0:
@@ -274,10 +277,35 @@ class Ranges:
         if predicate != "ne":
             return None
         ahead = start.high is not None and end.low is not None and start.high <= end.low
+        ends = steps.start, condition.other
+        hit = (steps.offset - less) % step == 0 and all(self._is_multiple(value, step) for value in ends)
         # past the end it would go on until it overflows: the compiler knows that it does not
-        if not (ahead and step == 1) and not (steps.is_sure and (sole or ahead)):
+        if not (ahead and hit) and not (steps.is_sure and (sole or ahead)):
             return None
         return max(0, -((start.low - end.high) // step))
+
+    def _unfolded(self, condition: Condition) -> tuple[Condition, int]:
+        """Of a difference that is compared with a number: its values compared, the first less that number."""
+        made = self._where[condition.one][1] if condition.one in self._where else None
+        found = BINARY.match(made.rest) if made is not None and made.opcode == "sub" else None
+        number = literal(condition.other).low
+        if found is None or number is None or condition.predicate not in ("eq", "ne"):
+            return condition, 0
+        return Condition(condition.predicate, found[3], found[4]), number
+
+    def _is_multiple(self, value: str, step: int) -> bool:
+        """Whether a number is one of a number of steps: as it stands, or by the last bits that are cleared of it."""
+        number = literal(value).low
+        if number is not None:
+            return number % step == 0
+        made = self._where[value][1] if value in self._where else None
+        if step == 1 or made is None:
+            return step == 1
+        if (added := added_number(made)) is not None:
+            return added[1] % step == 0 and self._is_multiple(added[0], step)
+        found = BINARY.match(made.rest) if made.opcode == "and" else None
+        mask = literal(found[4]).low if found else None
+        return mask is not None and (last_bits(mask) + 1) % step == 0
 
     def _steps(self, value: str, loop: Loop) -> _Steps | None:
         """How a value is stepped from round to round."""

@@ -19,7 +19,7 @@ from numba.np.arrayobj import make_array, populate_array
 from css_export.comments import comments_of
 from css_export.errors import ExportError
 from css_export.flown import INPUT, MEMORY, OUTPUT, PARAMETERS, STATE, Function
-from css_export.intermediate import kept_modules
+from css_export.intermediate import kept_module
 from css_export.layout import Array, Layout, Scalar, Struct, layout_of, struct_of
 
 POINTER = types.CPointer(types.uint8)
@@ -88,7 +88,7 @@ def compile_function(function: Function) -> Compiled:
     signature = types.void(POINTER, POINTER, POINTER, POINTER)
     try:
         dispatcher: Any = numba.njit(**_OPTIONS)(entry)
-        with kept_modules() as texts:
+        with kept_module(entry.__name__) as texts:
             dispatcher.compile(signature.args)
     except numba.core.errors.NumbaError as error:
         raise ExportError(f"{function.name}: not compiled: {str(error).strip().splitlines()[0]}") from error
@@ -97,7 +97,8 @@ def compile_function(function: Function) -> Compiled:
     interface = Interface(structs, tuple(fields), given["type"])
     symbol = overload.fndesc.llvm_func_name
     native = Native(overload.library.get_pointer_to_function(symbol), dispatcher)
-    return Compiled(interface, texts[overload.library.name], symbol, native)
+    (text,) = texts
+    return Compiled(interface, text, symbol, native)
 
 
 def interface_of(function: Function, output: Any) -> Interface:

@@ -5,23 +5,37 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from numba.core import codegen
+import numba
+from numba.core.codegen import JITCPUCodegen
 
 
 @contextmanager
-def kept_modules() -> Iterator[dict[str, str]]:
-    """Texts of the modules that are compiled inside the context, by the names of their libraries.
+def kept_module(outermost: str) -> Iterator[list[str]]:
+    """Keeps the text of the module of a function that is compiled inside the context.
 
-    What numba tells of a finished library is its module after LLVM has prepared it for the processor of this machine.
-    numba is locked; a version without this method is noticed at once.
+    What numba tells of a finished function is its module after LLVM has prepared it for the processor of this machine.
+    Functions that it compiles on the way are prepared so before they are linked into it. They are left without
+    instructions on several numbers at once, as many as this processor has: another one can only take them apart again.
+    numba is locked; a version without what is replaced here is noticed at once.
+
+    Args:
+        outermost: name of the function.
     """
-    kept: dict[str, str] = {}
-    library: Any = codegen.CPUCodeLibrary
+    kept: list[str] = []
+    library: Any = JITCPUCodegen._library_class
     optimise = library._optimize_final_module
 
     def keep(self: Any) -> None:
-        kept[self.name] = str(self._final_module)
-        optimise(self)
+        if self.name == outermost:
+            kept.append(str(self._final_module))
+            optimise(self)
+            return
+        settings: Any = numba.config
+        before, settings.LOOP_VECTORIZE = settings.LOOP_VECTORIZE, 0
+        try:
+            optimise(self)
+        finally:
+            settings.LOOP_VECTORIZE = before
 
     library._optimize_final_module = keep
     try:

@@ -98,10 +98,10 @@ def bound_of(text: str, function: str, whole_numbers: Iterable[tuple[int, int, i
         whole_numbers: place [bytes] in the parameters, least and largest value of those that are whole numbers.
     """
     codes = functions_of(text)
-    pointer = (codes[function].arguments or ("",))[0]
-    loads = {(pointer, at): Range(low, high) for at, low, high in whole_numbers}
+    numbers = {at: Range(low, high) for at, low, high in whole_numbers}
+    arguments = [ANY] * len(codes[function].arguments)
     try:
-        cost = _Bounds(codes, loads).of(function, ())
+        cost = _Bounds(codes, numbers).of(function, tuple(arguments), 0)
     except (_NoBoundError, ExportError) as error:
         return Bound(None, {}, str(error))
     return Bound(cost.pop(OPERATIONS, 0), cost)
@@ -110,20 +110,27 @@ def bound_of(text: str, function: str, whole_numbers: Iterable[tuple[int, int, i
 class _Bounds:
     """Of the functions of a module."""
 
-    def __init__(self, codes: Mapping[str, Code], loads: Mapping[tuple[str, int], Range]) -> None:
-        self._codes, self._loads = codes, loads
+    def __init__(self, codes: Mapping[str, Code], numbers: Mapping[int, Range]) -> None:
+        self._codes, self._numbers = codes, numbers
         self._flows: dict[str, Flow] = {}
-        self._known: dict[tuple[str, tuple[Range, ...]], Cost] = {}
+        self._known: dict[tuple[str, tuple[Range, ...], int | None], Cost] = {}
 
-    def of(self, function: str, arguments: tuple[Range, ...]) -> Cost:
-        """Of a function for given ranges of its arguments."""
-        key = function, arguments
+    def of(self, function: str, arguments: tuple[Range, ...], parameters: int | None) -> Cost:
+        """Of a function for given ranges of its arguments.
+
+        Args:
+            function: its name.
+            arguments: ranges of them.
+            parameters: which of them points to the parameters; None: none does.
+        """
+        key = function, arguments, parameters
         if key not in self._known:
             if function not in self._flows:
                 self._flows[function] = Flow(self._codes[function])
             flow = self._flows[function]
-            given = dict(zip(flow.code.arguments, arguments, strict=False))
-            ranges = Ranges(flow, given, {} if arguments else self._loads)
+            names = flow.code.arguments
+            pointer = names[parameters] if parameters is not None and names else ""
+            ranges = Ranges(flow, dict(zip(names, arguments, strict=False)), pointer, self._numbers)
             ranges.join_halves()
             self._known[key] = self._longest(flow, ranges, None)
         return dict(self._known[key])
@@ -168,7 +175,8 @@ class _Bounds:
             if called is not None:
                 if called[0] in self._codes and not called[0].startswith(PREFIX):
                     given = tuple(ranges.of(argument, name) for argument in called[1])
-                    total = _sum(total, self.of(called[0], given))
+                    handed = called[1].index(ranges.pointer) if ranges.pointer in called[1] else None
+                    total = _sum(total, self.of(called[0], given, handed))
                 lengths = [ranges.of(argument, name) for argument in called[1][2:3]]
             total = _sum(total, cost_of(made, self._codes, lengths, flow.code.name))
         return total

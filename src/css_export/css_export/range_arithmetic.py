@@ -94,6 +94,8 @@ def _product(one: Range, other: Range, width: int, sure: bool) -> Range:
 
 def _bits(opcode: str, one: Range, other: Range) -> Range:
     if opcode == "and":
+        if (rounded := _rounded(one, other) or _rounded(other, one)) is not None:
+            return rounded
         highs = [r.high for r in (one, other) if _is_natural(r) and r.high is not None]
         natural = _is_natural(one) or _is_natural(other)
         return Range(0 if natural else None, min(highs, default=None))
@@ -102,6 +104,21 @@ def _bits(opcode: str, one: Range, other: Range) -> Range:
             return Range(0, None)
         return Range(0, (1 << max(one.high, other.high).bit_length()) - 1)
     return ANY
+
+
+def _rounded(one: Range, mask: Range) -> Range | None:
+    """A range of which a mask takes the last bits alone; None: it takes others, too."""
+    if mask.low is None or mask.low != mask.high or not _is_natural(one) or one.low is None or one.high is None:
+        return None
+    taken = last_bits(mask.low)
+    if one.high & ~taken & ~mask.low:
+        return None
+    return Range(one.low & ~taken, one.high & ~taken) if mask.low | taken >= one.high or mask.low < 0 else None
+
+
+def last_bits(mask: int) -> int:
+    """The bits below the last one of a mask that is set."""
+    return (mask & -mask) - 1 if mask else 0
 
 
 def _shifted_or_divided(opcode: str, width: int, one: Range, other: Range) -> Range:

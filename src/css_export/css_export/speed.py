@@ -2,12 +2,12 @@
 """How long a step of a library takes on this machine, held against the kernel that the nodes call.
 
 Both are called in a loop of machine code with the inputs of the flight, from the same state on, by turns; of several
-runs the shortest counts.
+runs the shortest counts, in processor time: the machine may have other work.
 """
 
 import ctypes
 from pathlib import Path
-from time import perf_counter
+from time import thread_time
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -69,9 +69,9 @@ def time_ratio(library: Library, file: Path, calls: Calls) -> float | None:
         for name, run in loops.items():
             state = fresh.copy()
             pointers = (addresses[name], *(array.ctypes.data for array in (p, state, given, written)))
-            begun = perf_counter()
+            begun = thread_time()
             run(*pointers, size, len(inputs) // size)
-            shortest[name] = min(shortest[name], perf_counter() - begun)
+            shortest[name] = min(shortest[name], thread_time() - begun)
     return shortest["library"] / shortest["kernel"]
 
 

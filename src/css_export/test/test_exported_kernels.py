@@ -96,6 +96,11 @@ def test_other_parameters_give_other_bits(exported):
     assert verdict.largest_relative_difference > 0.0
 
 
+def test_no_code_is_made_for_as_many_numbers_at_once_as_this_machine_takes(exported):
+    library, _, _ = exported
+    assert not re.search(r"<\d+ x (double|i64|i1)>|@llvm\.masked", library.texts[0])
+
+
 def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported):
     library, _, calls = exported
     code = library.for_target(HOST)

@@ -180,6 +180,9 @@ over:
 }
 """
     assert bound_of(text, "f", [(16, 0, 9)]) == Bound(3 + 4 * 9 + 2 + 1)
+    around = text.replace("@f(ptr %p)", "@g(i64 %k, ptr %q)").replace("ptr %p", "ptr %q")
+    around += "define void @f(ptr %p) {\n  call void @g(i64 1, ptr %p)\n  ret void\n}\n"
+    assert bound_of(around, "f", [(16, 0, 9)]) == Bound(2 + 3 + 4 * 9 + 2 + 1)
     assert bound_of(text, "f", [(8, 0, 9)]).operations is None
 
 
@@ -210,6 +213,37 @@ clear:
 """
     # in 7 rounds back and 1 more it has grown by 2 at most in each of the first
     assert bound_of(text, "f") == Bound(1 + 8 * 8 + 1 + (1 + 2 + 7 * 2) + 1)
+
+
+def test_a_difference_that_is_compared_with_a_number():
+    text = loop("0", body="  %left = sub i64 %i, 12\n").replace("icmp slt i64 %i, 0", "icmp ne i64 %gone, 3")
+    text = text.replace("  %more = ", "  %gone = sub i64 %i, %twelve\n  %more = ")
+    text = text.replace("entry:\n", "entry:\n  %twelve = and i64 12, -1\n")
+    # 15 rounds of 5 with the body, the head of 3 once more, 2 before and 1 after
+    assert bound_of(text, "f") == Bound(2 + 15 * 6 + 3 + 1)
+
+
+@pytest.mark.parametrize(("step", "bounded"), [(2, True), (4, True), (8, False), (3, False)])
+def test_a_loop_that_the_compiler_unrolled_has_its_rounds(step, bounded):
+    """The number of rounds is one of the lengths of its steps, which the code shows by the bits that it clears."""
+    text = f"""
+define void @f(ptr %p, i64 %x) {{
+entry:
+  %some = and i64 %x, 15
+  %n = add i64 %some, 16
+  %even = and i64 %n, 9223372036854775804
+  br label %head
+head:
+  %i = phi i64 [ 0, %entry ], [ %i.next, %head ]
+  %i.next = add i64 %i, {step}
+  %end = icmp eq i64 %i.next, %even
+  br i1 %end, label %over, label %head
+over:
+  ret void
+}}
+"""
+    bound = bound_of(text, "f")
+    assert bound == Bound(4 + 3 * (28 // step) + 1) if bounded else bound.operations is None
 
 
 def test_bits_that_are_taken_one_by_one():
