@@ -4,7 +4,9 @@
 Each kind of fault of a cell is flown on several missions, from a third of the flight on, and once more without. A fault
 that changes fewer than ten outputs by more than 0.1 shows nothing and is counted apart. A verdict is right when its
 cell fails and its kind is the one that was flown, or one that reads the same: a frozen cell is stuck, one that reads
-nothing is dead, all light lost alike is a scale. False is every verdict on a cell without a fault. The last line is a
+nothing is dead, all light lost alike is a scale. Kinds that a verdict names as not told apart count as one of several,
+cells of which it says that there is not enough evidence as not told. False is every cell without a fault that is
+accused. The last line is a
 JSON object; the exit code is 1 when one in ten verdicts is wrong, missing or false.
 
     python benchmarks/check_verdicts.py --cases 2 --reference truth
@@ -28,7 +30,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from faulted_cells import FAULTS, MISSIONS, faulted
 from uncalibrated import flown, without_truth
 
-from css_calibration.check import HEALTHY, check
+from css_calibration.check import check
+from css_calibration.verdicts import HEALTHY
 
 
 def main() -> int:
@@ -63,15 +66,20 @@ def main() -> int:
 
 def _outcome(kind: str | None, verdicts: list, changed: np.ndarray) -> list[str]:
     failing = set() if kind is None else set(FAULTS[kind].cells)
-    outcome = ["false"] * len({v.cell for v in verdicts} - failing)
+    outcome = ["false"] * len({v.cell for v in verdicts if v.accuses} - failing)
     if kind is None:
         return outcome or ["right: healthy"]
     for cell in sorted(failing):
-        told = {v.verdict for v in verdicts if v.cell == cell}
+        told = {v.verdict for v in verdicts if v.cell == cell and v.accuses}
+        among = {word for v in verdicts if v.cell == cell for word in v.others}
         if told & set(FAULTS[kind].names):
             outcome.append("right")
+        elif among & set(FAULTS[kind].names):
+            outcome.append("one of several")
         elif told:
             outcome.append("wrong kind")
+        elif any(v.cell == cell for v in verdicts):
+            outcome.append("not told")
         else:
             outcome.append("missed" if changed[:, cell].sum() >= 10 else "does not show")
     return outcome

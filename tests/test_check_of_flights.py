@@ -9,9 +9,10 @@ from faulted_cells import FAULTS, faulted
 from synthetic_flight import record
 from uncalibrated import Flown, flown, mission_of, sun_alone, without_truth
 
-from css_calibration.check import CELLS, HEALTHY, Checked, check
+from css_calibration.check import CELLS, Checked, check
 from css_calibration.commands import check as command
 from css_calibration.recorded import Recorded
+from css_calibration.verdicts import HEALTHY, UNTOLD
 
 BEGIN = 700  # instant
 FAILING = 1
@@ -30,7 +31,7 @@ def spoiled(recorded: Recorded, spoil) -> Recorded:
 
 
 def verdicts(checked: Checked) -> dict[int, str]:
-    return {v.cell: v.verdict for v in checked.verdicts if v.verdict != HEALTHY}
+    return {v.cell: v.verdict for v in checked.verdicts if v.accuses}
 
 
 def dead(v, rng):
@@ -90,10 +91,38 @@ def test_healthy_cells_are_called_so_by_every_reference(flight):
     assert by_vote.reference == CELLS and by_vote.healthy
 
 
-def test_the_vote_of_the_cells_finds_one_that_is_stuck(flight):
-    checked = check(spoiled(flight.recorded, stuck), reference="cells")
-    assert verdicts(checked) == {FAILING: "stuck"}
+@pytest.mark.parametrize("spoil", [dead, stuck, scaled, swapped])
+def test_the_vote_of_the_cells_along_rates_finds_one_that_loses_light(flight, spoil):
+    checked = check(spoiled(flight.recorded, spoil), reference="cells")
+    found = verdicts(checked)
+    assert found == dict.fromkeys((FAILING, 3), "swapped") if spoil is swapped else found == {FAILING: spoil.__name__}
     assert any("nothing but the cells" in note for note in checked.notes)
+    assert any("rates hold the Sun still" in note for note in checked.notes)
+
+
+def test_without_rates_the_vote_is_of_each_instant_and_accuses_nobody_wrongly(flight):
+    recorded = spoiled(flight.recorded, stuck)
+    recorded.gyro_ns, recorded.gyro_b = recorded.gyro_ns[:0], recorded.gyro_b[:0]
+    checked = check(recorded, reference="cells")
+    assert verdicts(checked) == {FAILING: "stuck"}
+    assert any("a fault that another Sun explains" in note for note in checked.notes)
+
+
+POINTING = {"saturated": "stuck", "frozen": "stuck", "drifting": "drifting", "bias": "bias", "spikes": "spikes"}
+
+
+@pytest.mark.parametrize("kind", POINTING)
+def test_of_a_spacecraft_that_points_the_failing_cell_alone_is_accused(kind):
+    """Cells in the Sun from one side alone, at the edges of their views, and half of them in the dark for ever."""
+    recorded = flown(faulted("okeefe_2013", 0, kind)).recorded
+    checked = check(recorded.at(np.arange(0, len(recorded.stamp_ns), 3)))
+    assert verdicts(checked) == {0: POINTING[kind]}
+    (verdict,) = [v for v in checked.verdicts if v.cell == 0]
+    # a limit that the light is never below reads like a cell that is stuck there, and the other way round
+    assert set(verdict.others) <= ({"saturated"} if POINTING[kind] == "stuck" else set())
+    assert kind != "saturated" or verdict.others
+    never_lit = [v for v in checked.verdicts if v.evidence.startswith("never in the Sun")]
+    assert never_lit and {v.verdict for v in never_lit} == {UNTOLD}
 
 
 def test_a_shadow_of_structure_is_mapped(flight):

@@ -17,6 +17,7 @@ from css_bringup.replay_verdict import shortcomings, software_apart
 from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
+from css_environment.orbit_checks import recorded_orbit_findings
 from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
@@ -172,13 +173,23 @@ def replay(
         runs,
         stepping.rejected,
         stepping.missing,
-        [*reader.notes, *damaged, *stepping.reports],
+        [*reader.notes, *damaged, *stepping.reports, *_places_in_doubt(stepping)],
         incidents,
         elsewhere,
         (stepping.last_ns - stepping.first_ns) * 1e-9,
         wall_s,
         cpu_s,
     )
+
+
+def _places_in_doubt(stepping: Replay) -> list[str]:
+    """What is wrong with the element sets by which estimators know their place, at the time of the recording."""
+    lines: dict[str, None] = {}
+    for run in stepping.runs:
+        if hasattr(run.node.values, "orbit"):
+            found = recorded_orbit_findings(run.node.values, stepping.first_ns, stepping.last_ns)
+            lines |= dict.fromkeys(f"{run.label}: {finding.text}" for finding in found)
+    return list(lines)
 
 
 def _paired(replayed: Iterable[Replayed], log: FlightLog) -> Iterable[tuple[Replayed, Run]]:

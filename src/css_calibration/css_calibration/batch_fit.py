@@ -63,6 +63,19 @@ class Fit:
         """(N, 5) of the cells."""
         return self.unknowns.parameters(self.x)[0]
 
+    def prediction_variance(self, slopes: np.ndarray) -> np.ndarray:
+        """(M, N) variance of outputs that are predicted by what was found, by their derivatives (M, N, 6)."""
+        columns, scale = self.unknowns.column_of(), self.unknowns.sigma
+        variance = np.zeros(slopes.shape[:2])
+        for i, of_cell in enumerate(columns):
+            kinds = np.flatnonzero(of_cell >= 0)
+            places = of_cell[kinds]
+            if self.unknowns.earth:
+                kinds, places = np.append(kinds, EARTH), np.append(places, self.unknowns.count - 1)
+            by = slopes[:, i][:, kinds] * scale[places]
+            variance[:, i] = np.einsum("ka,ab,kb->k", by, self.covariance[np.ix_(places, places)], by)
+        return variance
+
     @property
     def earth(self) -> float:
         """Brightness of the Earth relative to the mean one."""

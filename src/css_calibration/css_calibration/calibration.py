@@ -116,7 +116,7 @@ def reference_of(recorded: Recorded, asked: str = "auto") -> str:
         for name, there in (
             ("rates (sensor_msgs/Imu)", len(recorded.gyro_ns) > 0),
             ("magnetic field (sensor_msgs/MagneticField)", recorded.field_b is not None),
-            ("the place (section orbit of the mission)", recorded.r_n is not None),
+            (f"the place ({recorded.no_place or 'section orbit of the mission'})", recorded.r_n is not None),
         )
         if not there
     ]

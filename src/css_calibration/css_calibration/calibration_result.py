@@ -31,6 +31,7 @@ _AIDS = (
     ("soft_iron", SOFT_IRON, ("xy", "xz", "yz"), "-", 1.0),
 )
 _NAMED = 0.35  # share of a weak direction from which a parameter is named
+_ALONE = 0.99  # of a direction, above which it is one parameter
 
 
 class Row(NamedTuple):
@@ -77,18 +78,23 @@ def _aid_rows(c: Calibration) -> Iterator[Row]:
 
 
 def unobserved_combinations(c: Calibration) -> list[str]:
-    """What the cells' outputs did not tell, each as the parameters that make it."""
+    """What the outputs did not tell: parameters by cell, then combinations, each as the parameters that make it."""
     count = c.fit.unknowns.count
     names = [
         f"cell {i}: {name}" for i in range(len(c.left)) for name, k, _, _ in _CELL_ROWS if c.fit.unknowns.free[i, k]
     ]
     names += ["earth"] * c.fit.unknowns.earth
+    alone: dict[str, list[str]] = {}
     found = []
     for direction in weak_directions(_of_cells(c.fit.information, count)):
         order = np.argsort(-np.abs(direction))
+        if abs(direction[order[0]]) > _ALONE:
+            cell, _, name = names[order[0]].rpartition(": ")
+            alone.setdefault(cell, []).append(name)
+            continue
         parts = [f"{direction[i]:+.2f} {names[i]}" for i in order if abs(direction[i]) > _NAMED]
         found.append(" ".join(parts or [f"{direction[i]:+.2f} {names[i]}" for i in order[:4]]))
-    return found
+    return [f"{cell}: {', '.join(told)}" if cell else ", ".join(told) for cell, told in alone.items()] + found
 
 
 def _of_cells(information: np.ndarray, count: int) -> np.ndarray:

@@ -37,6 +37,7 @@ class CellData:
         intensity: (M,) of sunlight.
         seen: (M, N) the Sun is in view.
         usable: (M, N) the output counts.
+        at_edge: (M, N) it does not, for the Sun may be in view or not; no more than both is known of it.
         albedo: (M, N) of the mean Earth.
         warmth: (M,) temperature less that of reference [K].
         time: (M,) [s].
@@ -51,6 +52,7 @@ class CellData:
     intensity: np.ndarray
     seen: np.ndarray
     usable: np.ndarray
+    at_edge: np.ndarray
     albedo: np.ndarray
     warmth: np.ndarray
     time: np.ndarray
@@ -64,7 +66,7 @@ class CellData:
 
     def some(self, rows: np.ndarray) -> "CellData":
         """The same at some of the instants."""
-        columns = ("voltages", "sun_b", "intensity", "seen", "usable", "albedo", "warmth", "time", "turned")
+        columns = ("voltages", "sun_b", "intensity", "seen", "usable", "at_edge", "albedo", "warmth", "time", "turned")
         chosen: dict[str, Any] = {name: np.ascontiguousarray(getattr(self, name)[rows]) for name in columns}
         return replace(self, **chosen)
 
@@ -131,21 +133,25 @@ def cell_data(
     gone = around.shadow > _GONE
     whole = (around.shadow < _WHOLE) & known
     seen &= whole[:, None]
-    usable = np.isfinite(recorded.voltages) & ~recorded.saturated & ((whole[:, None] & sure) | gone[:, None])
+    read = np.isfinite(recorded.voltages) & ~recorded.saturated
+    usable = read & ((whole[:, None] & sure) | gone[:, None])
+    at_edge = read & whole[:, None] & ~sure
     earth_known = dcm_bn is not None and recorded.r_n is not None
     albedo = np.zeros_like(recorded.voltages)
     if dcm_bn is not None and recorded.r_n is not None:
         normals = normals_b if parameters is None else normals_of(normals_b, parameters)
         albedo = earth_light(recorded, around, dcm_bn, normals)
-        usable &= (np.isfinite(dcm_bn).all(axis=(1, 2)) | gone)[:, None]
+        placed = np.isfinite(dcm_bn).all(axis=(1, 2))
+        usable &= (placed | gone)[:, None]
+        at_edge &= placed[:, None]
     turned = np.zeros(len(sun_b)) if dcm_bn is None else _turned(dcm_bn)
     warmth = np.zeros(len(sun_b))
     if recorded.temperature is not None:
         warmth = recorded.temperature - reference_temperature
     voltages = np.where(np.isfinite(recorded.voltages), recorded.voltages, 0.0)
     return CellData(
-        normals_b, voltages, np.ascontiguousarray(sun_b), np.where(gone, 0.0, around.intensity), seen, usable, albedo,
-        warmth, recorded.time, turned, response, earth_known,
+        normals_b, voltages, np.ascontiguousarray(sun_b), np.where(gone, 0.0, around.intensity), seen, usable,
+        at_edge, albedo, warmth, recorded.time, turned, response, earth_known,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_calibration.two_states import two_states
 from css_common.health import KIND_BIAS, KIND_DEAD, KIND_DRIFTING, KIND_SCALED, KIND_SWAPPED, KIND_UNKNOWN
 from css_common.kernel import kernel, typed_call
 from css_common.schema import default_values
@@ -39,6 +40,7 @@ class Outputs(NamedTuple):
     bad: np.ndarray  # (M, N) an output contradicts what is expected
     leaps: np.ndarray  # (M, N) it leaps, by the outputs next to it
     same: np.ndarray  # (M, N) it is that of the sample before, to the last bit, although others change
+    at_edge: np.ndarray  # (M, N) the Sun may be in view or not: an output that agrees says little
 
 
 class Stretch(NamedTuple):
@@ -61,9 +63,8 @@ def failing(outputs: Outputs, cell: int) -> list[tuple[int, int]]:
     for_fault[bad] = math.log(_BAD_FAILING / _BAD_HEALTHY)
     agreed = math.log((1.0 - _BAD_FAILING) / (1.0 - _BAD_HEALTHY))
     for_fault[lit & ~bad] = agreed
-    for_fault[known & ~lit & ~bad] = _DIM * agreed
-    state = np.empty(len(bad), np.int64)
-    _two_states(for_fault, _CHANGE, state, np.zeros((len(bad), 2), np.int64))
+    for_fault[known & ~bad & (~lit | outputs.at_edge[:, cell])] = _DIM * agreed
+    state = two_states(for_fault, _CHANGE)
     edges = np.flatnonzero(np.diff(np.concatenate([[0], state, [0]])))
     stretches = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
@@ -71,24 +72,6 @@ def failing(outputs: Outputs, cell: int) -> list[tuple[int, int]]:
         if len(inside):
             stretches.append((int(inside[0]), int(inside[-1])))
     return stretches
-
-
-@kernel
-def _likeliest(for_fault, change: float, state, came) -> None:
-    healthy, failed = 0.0, -change
-    for k in range(for_fault.shape[0]):
-        came[k, 0] = 0 if healthy >= failed - change else 1
-        came[k, 1] = 1 if failed >= healthy - change else 0
-        best_healthy = max(healthy, failed - change)
-        best_failed = max(failed, healthy - change) + for_fault[k]
-        healthy, failed = best_healthy, best_failed
-    now = 1 if failed > healthy else 0
-    for k in range(for_fault.shape[0] - 1, -1, -1):
-        state[k] = now
-        now = came[k, now]
-
-
-_two_states = typed_call(_likeliest)
 
 
 @kernel

@@ -24,6 +24,7 @@ from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.vectors import row
 from css_environment.mission_environment import mission_orbit
 from css_environment.orbit import orbit_states
+from css_environment.orbit_checks import recorded_orbit_findings
 from css_msgs.msg import CssVoltages, SpacecraftState
 from css_recording.bag_reader import BagReader
 
@@ -58,6 +59,7 @@ class Recorded:
         r_n: (M, 3) position [m]; None: unknown.
         sunlight: (M,) intensity of the Sun that a truth without a place tells; None: unknown.
         notes: what was left out or guessed, one line each.
+        no_place: why the orbit of the mission tells no position; empty: it does, or there is none.
     """
 
     origin: str
@@ -74,6 +76,7 @@ class Recorded:
     r_n: np.ndarray | None = None
     sunlight: np.ndarray | None = None
     notes: list[str] = field(default_factory=list)
+    no_place: str = ""
 
     @property
     def period_s(self) -> float:
@@ -106,6 +109,7 @@ class Recorded:
             some(self.r_n),
             some(self.sunlight),
             self.notes,
+            self.no_place,
         )
 
 
@@ -204,12 +208,23 @@ def recorded_of(origin: str, mission: Mission, columns: Mapping[type, Columns], 
     if truth is not None and len(truth):
         _add_truth(recorded, truth, half_ns)
     if recorded.r_n is None and mission.values.orbit.source != "none" and mission.values.mission.epoch:
-        elapsed = (stamps - mission.epoch_ns) * 1e-9
-        try:
-            recorded.r_n, _ = orbit_states(mission_orbit(mission.values), mission.epoch_ns, elapsed)
-        except ValueError as error:
-            raise MissionError(f"{mission.origin}: orbit: {error}") from error
+        _add_place(recorded)
     return recorded
+
+
+def _add_place(recorded: Recorded) -> None:
+    """Positions by the orbit of the mission; none where its element set is of another time."""
+    mission, stamps = recorded.mission, recorded.stamp_ns
+    for finding in recorded_orbit_findings(mission.values, int(stamps[0]), int(stamps[-1])):
+        recorded.notes.append(finding.text)
+        if finding.refused:
+            recorded.no_place = finding.text
+            return
+    elapsed = (stamps - mission.epoch_ns) * 1e-9
+    try:
+        recorded.r_n, _ = orbit_states(mission_orbit(mission.values), mission.epoch_ns, elapsed)
+    except ValueError as error:
+        raise MissionError(f"{mission.origin}: orbit: {error}") from error
 
 
 def _rates(imu: Columns | None) -> tuple[np.ndarray, np.ndarray]:

@@ -9,12 +9,15 @@ import numpy as np
 
 from css_calibration.batch_fit import Fit
 from css_calibration.cell_data import CellData
+from css_calibration.fault_stretches import Outputs
 from css_calibration.recorded import Recorded
 from css_common.health import KIND_DRIFTING, KIND_NOISY
 
 _TIMES, _LEAST_NOISE = 3.0, 0.008
 _BRIGHTNESS = (0.02, 0.15, 0.4, 0.7, np.inf)  # outputs within which noise is alike
 _FEWEST_OTHERS = 2
+_BESIDE = 0.05  # [-] beside its brightness that a sample may be
+_FEWEST_LEAPS, _LEAST_LEAPS, _MOST_LEAPS = 15, 0.02, 0.4
 _BLOCKS = 8
 _FEWEST = 12  # lit outputs of a block
 _SIGMAS, _CHANGE = 6.0, 0.06
@@ -35,10 +38,13 @@ def noisy_cells(recorded: Recorded) -> dict[int, Slow]:
     Noise goes with the light where it is a loss or a jitter: a lit cell is not to be held against dark ones.
     """
     thirds = np.abs(np.diff(recorded.voltages, n=3, axis=0))
-    brightness = np.median([recorded.voltages[k : len(thirds) + k] for k in range(4)], axis=0)
+    samples = np.array([recorded.voltages[k : len(thirds) + k] for k in range(4)])
+    brightness, least, most = np.median(samples, axis=0), samples.min(axis=0), samples.max(axis=0)
     worst: dict[int, tuple[float, float]] = {}  # noise of each cell that is beyond, and that of others as bright
     for low, high in pairwise(_BRIGHTNESS):
-        noise = _noise_between(thirds, brightness, low, high)
+        # neither on the way through the edge of a view nor through a spike is a cell as bright as the middle one says
+        steady = (least > low - _BESIDE) & (most <= high + _BESIDE)
+        noise = _noise_between(np.where(steady, thirds, np.nan), brightness, low, high)
         for i in np.flatnonzero(np.isfinite(noise)).tolist():
             others = np.delete(noise, i)
             if np.isfinite(others).sum() < _FEWEST_OTHERS:
@@ -60,6 +66,23 @@ def _noise_between(thirds: np.ndarray, brightness: np.ndarray, low: float, high:
         if inside.sum() > _FEWEST:
             noise[i] = 1.4826 * float(np.median(thirds[inside, i])) / math.sqrt(20.0)
     return noise
+
+
+def spiky(outputs: Outputs) -> dict[int, tuple[int, int]]:
+    """Cells that leap now and then where others do not, and the first and last instant of it."""
+    known = np.isfinite(outputs.expected)
+    leaps = outputs.leaps & known
+    count = leaps.sum(axis=0)
+    share = count / np.maximum(known.sum(axis=0), 1)  # of all that is known
+    found = {}
+    for i in np.flatnonzero((count >= _FEWEST_LEAPS) & (share > _LEAST_LEAPS)).tolist():
+        if share[i] > _TIMES * max(float(np.max(np.delete(share, i), initial=0.0)), _LEAST_LEAPS / _TIMES):
+            rows = np.flatnonzero(leaps[:, i])
+            first, last = int(rows[0]), int(rows[-1])
+            # noise leaps at most samples
+            if count[i] < _MOST_LEAPS * known[first : last + 1, i].sum():
+                found[i] = (first, last)
+    return found
 
 
 def ageing(data: CellData, result: Fit, cell: int) -> Slow | None:

@@ -23,20 +23,71 @@ _RED, _PLAIN = "\x1b[31m", "\x1b[0m"
 
 # Values that begin with a minus and are no options: numbers, several of them, and faces of a body.
 _VALUES = re.compile(r"-(\.?\d|[xyz](,|$))")
+_PAIR = re.compile(r"[A-Za-z_]\w*(\.\w+)*=")
+_PAIRS = "KEY="  # begins the metavar of an option that takes such
 
 
 class CommandParser(argparse.ArgumentParser):
-    """Parser whose errors look like every other error of the command, and for which `-x` is a face of a body."""
+    """Parser whose errors look like every other error of the command, and for which `-x` is a face of a body.
+
+    What takes several values takes them behind one option, or behind the option repeated: a list is joined, and a word
+    KEY=VALUE behind one that an option of such words has taken is that option's too.
+    """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         # as argparse has it for single numbers alone: a word of this kind is a value where no such option is declared
         self._negative_number_matcher = _VALUES
 
+    def add_argument(self, *names: Any, **options: Any) -> argparse.Action:
+        """As argparse has it, but lists of a repeated option are joined, where it would forget the first in silence."""
+        if options.get("nargs") in ("+", "*") and names[0].startswith("-") and "action" not in options:
+            options["action"] = _Joined
+        return super().add_argument(*names, **options)
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse has it, with `--set A=1 B=2` for `--set A=1 --set B=2`."""
+        return super().parse_known_args(self._each_with_its_option(sys.argv[1:] if args is None else args), namespace)
+
+    def _each_with_its_option(self, words: Sequence[str]) -> list[str]:
+        names = [name for action in self._actions for name in action.option_strings]
+        pairs = {
+            name for action in self._actions for name in action.option_strings
+            if isinstance(action, argparse._AppendAction) and str(action.metavar).startswith(_PAIRS)
+        }  # fmt: skip
+        spread: list[str] = []
+        option, has_value = "", False
+        for number, word in enumerate(words):
+            if word == "--":
+                return [*spread, *words[number:]]
+            if word.startswith("--"):
+                name, equals, _ = word.partition("=")
+                meant = [name] if name in names else [known for known in names if known.startswith(name)]
+                option = meant[0] if len(meant) == 1 and meant[0] in pairs else ""
+                has_value = bool(equals)
+            elif option and has_value and _PAIR.match(word):
+                spread.append(option)
+            elif option and not has_value:
+                has_value = True
+            else:
+                option = ""
+            spread.append(word)
+        return spread
+
     def error(self, message: str) -> Never:
         """Prints one line, and ends the process."""
         complain(self.prog, f"{message}; see {self.prog} --help")
         sys.exit(USAGE)
+
+
+class _Joined(argparse.Action):
+    """Values of an option that takes a list, of all the times that it is given; the first takes the default's place."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: argparse.Namespace, values: Any, option_string: Any = None
+    ) -> None:
+        known = getattr(namespace, self.dest)
+        setattr(namespace, self.dest, list(values) if known is self.default else [*known, *values])
 
 
 MISSION_HELP = "name in config/ or a file, which may extend another mission (default: %(default)s)"

@@ -62,6 +62,41 @@ def test_faces_and_numbers_below_zero_are_values(parser, capsys):
     assert "unrecognized arguments: -xy" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["okeefe", "--disperse", "a.b=normal:0.1", "c=uniform:0:1", "--cases", "3"],
+        ["okeefe", "--disperse", "a.b=normal:0.1", "--cases", "3", "--disperse", "c=uniform:0:1"],
+        ["--disperse", "a.b=normal:0.1", "c=uniform:0:1", "okeefe", "--cases=3"],
+        ["--cases", "3", "--disperse=a.b=normal:0.1", "c=uniform:0:1", "okeefe"],
+        ["--cases", "3", "--disp", "a.b=normal:0.1", "c=uniform:0:1", "--", "okeefe"],
+    ],
+)
+def test_pairs_stand_behind_one_option_or_each_behind_its_own(parser, words):
+    parser.add_argument("mission")
+    parser.add_argument("--disperse", action="append", default=[], metavar="KEY=DISTRIBUTION")
+    parser.add_argument("--cases", type=int)
+    read = parser.parse_args(words)
+    assert read.disperse == ["a.b=normal:0.1", "c=uniform:0:1"]
+    assert (read.mission, read.cases) == ("okeefe", 3)
+
+
+def test_a_pair_that_no_option_takes_is_named(parser, capsys):
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
+    parser.add_argument("--cases", type=int)
+    with pytest.raises(SystemExit):
+        parser.parse_args(["--set", "a=1", "--cases", "3", "b=2"])
+    assert "unrecognized arguments: b=2" in capsys.readouterr().err
+
+
+def test_a_repeated_option_forgets_nothing(parser):
+    parser.add_argument("--estimators", nargs="+", default=["ekf"])
+    parser.add_argument("--faces", nargs="+")
+    read = parser.parse_args(["--estimators", "wavg", "--faces", "+x", "-x", "--estimators", "wls", "flat"])
+    assert (read.estimators, read.faces) == (["wavg", "wls", "flat"], ["+x", "-x"])
+    assert parser.parse_args([]).estimators == ["ekf"] and parser.parse_args([]).faces is None
+
+
 def raising(error):
     def run():
         raise error

@@ -8,6 +8,7 @@ import pytest
 from css_common.epochs import parse_utc
 from css_common.mission import load_mission
 from css_design.errors import DesignError
+from css_design.new_mission.new_mission import new_mission, read_items
 from css_design.new_mission.orbits import (
     TROPICAL_YEAR,
     node_at_local_time,
@@ -122,3 +123,19 @@ def test_what_is_no_epoch_is_refused():
         with pytest.raises(DesignError, match="--epoch"):
             orbit_of("sso 500 10:30", epoch)
     assert parse_utc(orbit_of("sso 500 10:30", "2026-02-03").epoch) == parse_utc("2026-02-03T00:00:00Z")
+
+
+def test_an_epoch_that_nobody_named_is_held_against_today(tmp_path):
+    file = tmp_path / "iss.tle"
+    file.write_text("\n".join(SET) + "\n")
+
+    def warnings(today, **given):
+        asked, origin = read_items({"orbit": f"tle {file}", **given}, "1u")
+        return new_mission("mine", asked, origin, parse_utc(today)).warnings
+
+    (line,) = warnings("2034-01-01T12:00:00Z")
+    assert line.startswith("--epoch: auto takes that of the element set, 2024-01-01T12:00:00Z, 10.0 years ago: ")
+    assert line.endswith("expected a set of the days of the flight, or --epoch 2024-01-01T12:00:00Z")
+    assert "100 days ahead" in warnings("2023-09-23T12:00:00Z")[0]
+    assert warnings("2024-02-01T00:00:00Z") == ()
+    assert warnings("2034-01-01T12:00:00Z", epoch="2024-01-01T12:00:00Z") == ()

@@ -53,6 +53,19 @@ def orbit_findings(values: Values) -> Iterator[Finding]:
         )
 
 
+def recorded_orbit_findings(values: Values, first_ns: int, last_ns: int) -> list[Finding]:
+    """What is wrong with a mission's element set over the time of a recording; none of other orbits.
+
+    Args:
+        values: section orbit.
+        first_ns, last_ns: of the recording (UTC), whatever the mission's own epoch.
+    """
+    if values.orbit.source != "tle":
+        return []
+    orbit = TleOrbit(values.orbit.tle_line1, values.orbit.tle_line2)
+    return list(tle_findings(orbit, first_ns, max(1.0, (last_ns - first_ns) * 1e-9)))
+
+
 def _arc_findings(orbit: KeplerianOrbit, epoch_ns: int, duration_s: float) -> Iterator[Finding]:
     r_n, _ = orbit_states(orbit, epoch_ns, duration_s)
     (height,) = geodetic_heights(epoch_ns, np.array([duration_s]), r_n)

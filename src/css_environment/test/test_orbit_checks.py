@@ -13,7 +13,7 @@ from css_common.schema import shaped_values
 from css_common.sections import MISSION, ORBIT
 from css_environment.magnetic_field import field_along_orbit
 from css_environment.orbit import TleOrbit
-from css_environment.orbit_checks import field_findings, orbit_findings
+from css_environment.orbit_checks import field_findings, orbit_findings, recorded_orbit_findings
 from css_environment.tle_checks import checksum, tle_findings
 
 EPOCH = parse_utc("2013-06-01T12:00:00Z")
@@ -148,3 +148,13 @@ def test_arcs_that_end_in_the_ground_or_are_none():
     assert "km below the ground" in deep.text and math.isfinite(float(deep.text.split(" is ")[1].split()[0]))
     (none,) = orbit_findings(values(**arc | {"orbit.launch.height": 2000.0, "orbit.launch.apogee": 1500.0}))
     assert none.refused and none.text.startswith("orbit.launch.apogee")
+
+
+def test_a_recording_of_another_time_than_its_element_set():
+    by_set = values(**{"orbit.source": "tle", "orbit.tle_line1": LINE1, "orbit.tle_line2": LINE2})
+    assert recorded_orbit_findings(by_set, EPOCH, EPOCH + DAY) == []
+    (doubtful,) = recorded_orbit_findings(by_set, EPOCH + 10 * DAY, EPOCH + 11 * DAY)
+    assert not doubtful.refused and "used up to 11.0 days after its epoch" in doubtful.text
+    (refused,) = recorded_orbit_findings(by_set, EPOCH + 3653 * DAY, EPOCH + 3654 * DAY)
+    assert refused.refused and "up to 3654.0 days after its epoch, expected at most 60" in refused.text
+    assert recorded_orbit_findings(values(), EPOCH + 3653 * DAY, EPOCH + 3654 * DAY) == []

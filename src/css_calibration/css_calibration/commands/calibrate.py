@@ -6,14 +6,12 @@ coefficient; of the magnetometer bias, scale and soft iron; of the gyro its bias
 what the recording cannot tell named and left as it is. The outputs at the end are held out and show what it is worth.
 """
 
-import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from css_common.command import CommandParser, command_parser, guarded, implementation, number
-from css_common.mission_file import MissionError
-from css_recording.errors import BagError
+from css_calibration.recording_command import add_recording, run_command
+from css_common.command import CommandParser, command_parser, number
 
 _EXAMPLES = (
     "bags/FLIGHT",
@@ -22,7 +20,7 @@ _EXAMPLES = (
 )
 _EXITS = {
     0: "calibrated, and the heading of the part that was held out errs by less",
-    1: "calibrated, but the heading there errs by no less, or no cell was told anything",
+    1: "calibrated, but the heading there errs by no less, or no cell was told more than its dark level",
     2: "the recording has nothing to hold the cells against, or what is asked for is wrong",
 }
 _NOTES = """\
@@ -32,17 +30,10 @@ with --extends MISSION it is a mission itself."""
 
 def _parser() -> CommandParser:
     parser = command_parser("css_calibration", "calibrate", __doc__, _EXAMPLES, _EXITS, _NOTES)
-    parser.add_argument("bag", type=Path, help="recording: a rosbag2 folder or an .mcap file")
+    add_recording(parser)
     parser.add_argument("--out", type=Path, metavar="FILE", help="calibration file (default: BAG_calibration.yaml)")
     parser.add_argument("--overwrite", action="store_true", help="replace a file that is there")
     parser.add_argument("--extends", metavar="MISSION", help="write a mission that extends this one")
-    parser.add_argument("--mission", metavar="NAME", help="cells and orbit of this mission, not of the recording's own")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter"
-    )
-    parser.add_argument(
-        "--remap", nargs="+", default=[], metavar="OLD:=NEW", help="topics of the recording under the graph's names"
-    )
     parser.add_argument(
         "--reference", choices=("auto", "truth", "batch"), default="auto",
         help="true Sun or attitude, or attitude from rates, field and place (default: a truth if there is one)",
@@ -55,20 +46,12 @@ def _parser() -> CommandParser:
         "--holdout", type=number("a share from 0 to 0.8", lambda value: 0.0 <= value <= 0.8), default=0.25,
         metavar="SHARE", help="of the sunlight, at its end (default: %(default)s; 0: none)",
     )  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    parser = _parser()
-    options = parser.parse_args(arguments)
-    # matrices of a few hundred columns are slower on several threads, and their sums others
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    from css_calibration.errors import CalibrationError
-
-    run = implementation("css_calibration.verbs.calibrate")
-    return guarded(parser.prog, lambda: run(parser.prog, options), (MissionError, BagError, CalibrationError, OSError))
+    return run_command(_parser(), arguments, "css_calibration.verbs.calibrate", "interrupted; no calibration written")
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from css_calibration.calibration_result import (
     rows_of,
     unobserved_combinations,
 )
+from css_calibration.cell_fit_model import GAIN, TILT_1, TILT_2
 from css_calibration.errors import CalibrationError
 from css_calibration.mission_of import recorded_by
 from css_calibration.step_lines import step_lines
@@ -69,6 +70,8 @@ def _default_file(bag: Path) -> Path:
 def _shortcoming(result: Calibration) -> str:
     if not result.observed.any():
         return "no parameter of any cell was told"
+    if not result.observed[:, [GAIN, TILT_1, TILT_2]].any():
+        return "dark levels alone were told, no scale and no tilt: expected minutes of sunlight on each cell"
     before, after = mean_deg(result.before), mean_deg(result.after)
     if before is not None and after is not None and after > before + _SAME_DEG:
         return f"the heading of the part that was held out errs by {after:.3f} deg, by {before:.3f} before"
@@ -88,7 +91,8 @@ def _print(result: Calibration, console: Console) -> None:
             name = f"{row.name} [{row.unit}]" if row.unit != "-" else row.name
             table.add_texts([name, f"{row.value:.5g}" if row.observable else "not told", f"{row.sigma:.2g}"])
         console.print(table)
-    console.print(_residual_table(result))
+    if residual_rows(result):
+        console.print(_residual_table(result))
     for outlier in outlier_rows(result):
         console.print(
             f"left out: {outlier['outputs']} of {outlier['of']} outputs of cell {outlier['cell']}, from "

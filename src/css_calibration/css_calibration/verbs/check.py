@@ -8,15 +8,16 @@ from typing import Any
 from rich.console import Console
 
 from css_analysis.readable_table import ReadableTable
-from css_calibration.check import HEALTHY, Checked, Verdict, check
+from css_calibration.check import Checked, check
 from css_calibration.mission_of import recorded_by
 from css_calibration.step_lines import step_lines
+from css_calibration.verdicts import UNTOLD, Verdict
 from css_common.command import FAILED
 from css_common.epochs import format_utc
 from css_common.progress_lines import still_working
 
 
-def run(options: argparse.Namespace) -> int:
+def run(_prog: str, options: argparse.Namespace) -> int:
     """Checks as the options say; the exit code."""
     with still_working(f"checking {options.bag}"):
         result = check(recorded_by(options), reference=options.reference, tell=step_lines())
@@ -43,6 +44,7 @@ def _cell_object(verdict: Verdict) -> dict[str, Any]:
     row: dict[str, Any] = {
         "cell": verdict.cell,
         "verdict": verdict.verdict,
+        "not_told_apart": list(verdict.others),
         "evidence": verdict.evidence,
         "from": format_utc(verdict.first_ns),
         "to": format_utc(verdict.last_ns),
@@ -61,12 +63,13 @@ def _print(result: Checked, console: Console) -> None:
     for heading in ("cell", "verdict", "from", "to", "evidence"):
         table.add_name(heading)
     for v in result.verdicts:
-        whole = v.verdict == HEALTHY
-        span = ("", "") if whole else (format_utc(v.first_ns), format_utc(v.last_ns))
-        table.add_texts([f"{v.cell}", v.verdict, *span, v.evidence])
+        span = (format_utc(v.first_ns), format_utc(v.last_ns)) if v.accuses else ("", "")
+        table.add_texts([f"{v.cell}", v.words, *span, v.evidence])
     console.print(table)
     for line in result.notes:
         console.print(f"noted: {line}", soft_wrap=True)
-    failing = sorted({v.cell for v in result.verdicts if v.verdict != HEALTHY})
+    failing = sorted({v.cell for v in result.verdicts if v.accuses})
+    untold = sorted({v.cell for v in result.verdicts if v.verdict == UNTOLD})
     count = recorded.voltages.shape[1]
-    console.print(f"{count - len(failing)} of {count} cells are healthy" + (f"; not: {failing}" if failing else ""))
+    rest = "".join(f"; {word}: {cells}" for word, cells in (("not", failing), (UNTOLD, untold)) if cells)
+    console.print(f"{count - len(failing) - len(untold)} of {count} cells are healthy{rest}")

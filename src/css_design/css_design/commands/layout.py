@@ -21,6 +21,7 @@ _EXAMPLES = (
     "cubesat_3u_safe --faces +x -x +y -y --tilt 20 --cells 6-8 --json",
     "okeefe_2013 --cells 8 --pointing 0 --weights 1,0,0",
     "okeefe_2013 --cells 8 --pointing 0.8 --weights 1,0,0.5,0.5",
+    "okeefe_2013 --cells 8 --flights 48",
     "cubesat_3u_safe --structure docs/samples/cubesat_boxes.yaml --views 90 120",
 )
 _NOTES = """\
@@ -77,6 +78,13 @@ def _parser() -> CommandParser:
         type=Path,
         metavar="FILE",
         help="what blocks the cells: an STL, OBJ or PLY file in m, or boxes in a YAML file (docs/layout.md)",
+    )
+    add(
+        "--flights",
+        type=int,
+        metavar="N",
+        help="let what the ways of the search end with, the mission's own layout and what lies between fly so many "
+        "cases each with the mission's own estimator, and take that with the smallest 95 %% error",
     )
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter")
     add("--out", type=Path, metavar="DIR", help="folder of the missions (default: layouts/MISSION)")

@@ -36,6 +36,7 @@ class LayoutSearch:
 
     Attributes:
         best: by number of cells.
+        ends: by number of cells, what the ways to it ended with: other layouts that nothing near is better than.
     """
 
     def __init__(
@@ -60,6 +61,7 @@ class LayoutSearch:
         self._readings = judge.read(self._places)
         self._progress = progress
         self.best: dict[int, Found] = {}
+        self.ends: dict[int, list[Found]] = {}
 
     def run(self, counts: Iterable[int], starts: Sequence[Cells] = ()) -> None:
         """Searches layouts of each number of cells.
@@ -78,15 +80,23 @@ class LayoutSearch:
             for start in [self._places.chosen(chosen), *grown, *(s for s in starts if s.number == count)]:
                 self._keep(start)
                 self._progress(f"{count} cells: refinement")
-                self._keep(self._refined(start))
+                end = self._keep(self._refined(start))
+                if end is not None:
+                    self.ends.setdefault(count, []).append(end)
 
-    def _keep(self, cells: Cells) -> None:
-        if not allowed(cells.normals_b, self._faces, self._tilt_deg, self._judge.clip_normal_b):
-            return
+    def _keep(self, cells: Cells) -> Found | None:
+        """What cells come to, the best so far if it is; None: they may not be where they are."""
+        if not self.may_be(cells):
+            return None
         error = self._judge.error_of(cells)
         found, known = Found(cells, error, self._judge.cost(error)), self.best.get(cells.number)
         if known is None or found.cost < known.cost:
             self.best[cells.number] = found
+        return found
+
+    def may_be(self, cells: Cells) -> bool:
+        """Whether cells are on the faces, within the tilt."""
+        return allowed(cells.normals_b, self._faces, self._tilt_deg, self._judge.clip_normal_b)
 
     def _cost(self, chosen: Sequence[int]) -> float:
         return self._judge.cost(self._judge.error(self._places, self._readings, chosen))

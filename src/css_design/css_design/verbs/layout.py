@@ -6,22 +6,30 @@ import json
 import math
 import re
 import sys
+from collections.abc import Callable
+from typing import Any
 
+import numpy as np
 from rich.console import Console
 
 from css_analysis.readable_table import ReadableTable
 from css_common import places
 from css_common.command import FAILED, INTERRUPTED
-from css_common.mission import load_mission
+from css_common.mission import Mission, load_mission
+from css_common.preflight import preflight, report
 from css_design.errors import DesignError
+from css_design.layout.flown import Flown, between, fly_layouts
 from css_design.layout.front import Point, error_object, front_of, write_missions, write_own
 from css_design.layout.heading_error import HeadingError
 from css_design.layout.judge import Aims, LayoutJudge
 from css_design.layout.placements import TILTS_DEG, candidates, faces_of
-from css_design.layout.search import LayoutSearch
+from css_design.layout.readings import Cells
+from css_design.layout.search import Found, LayoutSearch
 from css_design.layout.structure import read_structure
 from css_sensors.cells import MOST_CELLS
 
+MOST_FLIGHTS = 10_000
+_SAME = 0.01  # [rad] by which normals of layouts that are taken for one differ
 _COLUMNS = ("mean", "worst", "failed\nmean", "failed\nworst", "worst\n5 %")
 
 
@@ -29,8 +37,11 @@ def run(options: argparse.Namespace) -> int:
     """Searches as the options say; the exit code."""
     counts = _counts(options.cells)
     aims = _aims(options.weights)
+    if options.flights is not None and not 2 <= options.flights <= MOST_FLIGHTS:
+        raise DesignError(f"--flights: {options.flights} given, expected 2 to {MOST_FLIGHTS}")
     faces = faces_of(options.faces)
     mission = load_mission(options.mission, options.overrides)
+    report(preflight(mission))  # before minutes of search, what none of its layouts would fly with
     messages, console = Console(stderr=True, highlight=False), Console(highlight=False)
     structure = None if options.structure is None else read_structure(options.structure)
     if structure is not None:
@@ -41,12 +52,15 @@ def run(options: argparse.Namespace) -> int:
     views = sorted(set(options.views)) if options.views else sorted(set(own.views_deg.tolist()))
     tilts = sorted({min(tilt, options.tilt) for tilt in (*TILTS_DEG, options.tilt)})
     interrupted = False
+    flown: dict[int, list[Flown]] = {}
     with messages.status("reading cells") as status:
         search = LayoutSearch(
             judge, faces, candidates(faces, tilts, views), options.tilt, lambda what: _tell(messages, status, what)
         )
         try:
             search.run(counts, [own])
+            if options.flights is not None:
+                _fly(mission, judge, search, options.flights, flown, lambda what: _tell(messages, status, what))
         except KeyboardInterrupt:
             interrupted = True
     if not search.best:
@@ -60,6 +74,8 @@ def run(options: argparse.Namespace) -> int:
         written_own = write_own(mission, own, judge.own_blocked, folder)
         console.print(f"the mission's own cells with what the structure blocks: {written_own}", soft_wrap=True)
     _print(points, own.number, own_error, judge.cost(own_error), console)
+    for of_count in flown.values():
+        _print_flown(of_count, console)
     for line in refused:
         print(f"layout: warning: {line}", file=sys.stderr)
     if written:
@@ -69,6 +85,7 @@ def run(options: argparse.Namespace) -> int:
             "mission": mission.name,
             "own": {"cells": own.number, **error_object(own_error), "cost_deg": judge.cost(own_error)},
             "front": [point.as_object() for point in points],
+            "flown": {count: [_flown_object(one) for one in of_count] for count, of_count in flown.items()},
             "weights": aims._asdict(),
             "pointing": options.pointing,
             "prior_deg": options.prior,
@@ -81,6 +98,61 @@ def run(options: argparse.Namespace) -> int:
         print("layout: interrupted; these are the best so far", file=sys.stderr)
         return INTERRUPTED
     return FAILED if refused else 0
+
+
+def _fly(
+    mission: Mission,
+    judge: LayoutJudge,
+    search: LayoutSearch,
+    cases: int,
+    flown: dict[int, list[Flown]],
+    tell: Callable[[str], None],
+) -> None:
+    """The best of each number of cells by flights takes the place of that of the search."""
+    for count in sorted(search.best):
+        finalists: list[tuple[str, Cells]] = []
+        if count == judge.own.number:
+            finalists.append(("the mission's own", judge.own))
+        for number, end in enumerate(search.ends.get(count, ())):
+            if any(np.allclose(end.cells.normals_b, cells.normals_b, atol=_SAME) for _, cells in finalists):
+                continue
+            name = f"found {number + 1}"
+            finalists.append((name, end.cells))
+            if count == judge.own.number:
+                ways = between(judge.own, end.cells)
+                finalists += [(f"{name}, {part + 1} of {len(ways) + 1} of the way", c) for part, c in enumerate(ways)]
+        finalists = [one for one in finalists if search.may_be(one[1])]
+        tell(f"{count} cells: {len(finalists)} layouts fly {cases} cases each")
+        flown[count] = fly_layouts(mission, finalists, judge.blocked, cases)
+        best = flown[count][0]
+        error = judge.error_of(best.cells)
+        search.best[count] = Found(best.cells, error, judge.cost(error))
+
+
+def _print_flown(flown: list[Flown], console: Console) -> None:
+    table = ReadableTable(
+        f"{flown[0].cells.number} cells in {flown[0].cases} flights each: heading error in sunlight once acquired, deg"
+    )
+    table.add_name("layout")
+    for column in ("mean", "95 %", "its interval", "acquired"):
+        table.add_number(column)
+    for one in flown:
+        span = f"{one.bound.low:.2f} .. {one.bound.high:.2f}"
+        table.add_texts([one.name, f"{one.mean:.2f}", f"{one.bound.value:.2f}", span, f"{one.acquired}"])
+    console.print(table)
+    console.print(f"taken for {flown[0].cells.number} cells: {flown[0].name}", soft_wrap=True)
+
+
+def _flown_object(one: Flown) -> dict[str, Any]:
+    known = {"mean_deg": one.mean, "bound_95_deg": one.bound.value}
+    return {
+        "layout": one.name,
+        "normals": one.cells.normals_b.tolist(),
+        **{key: value if math.isfinite(value) else None for key, value in known.items()},
+        "bound_95_confidence_deg": [one.bound.low, one.bound.high] if math.isfinite(one.bound.low) else None,
+        "acquired": one.acquired,
+        "cases": one.cases,
+    }
 
 
 def _tell(console: Console, status: object, what: str) -> None:
