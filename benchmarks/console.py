@@ -39,9 +39,9 @@ ALONE, SERVED, WATCHED, FROZEN, ATTACHED = (
 WAYS = (ALONE, SERVED, WATCHED, FROZEN, ATTACHED)
 
 
-def fly(way: str, duration: float, libraries: Mapping[str, Path]) -> dict[str, float]:
+def fly(way: str, duration: float, rate: float, libraries: Mapping[str, Path]) -> dict[str, float]:
     """One flight: wall and processor time [s] of its loop, and processor time [s] of the browser meanwhile."""
-    mission = load_mission("okeefe_2013", [f"mission.duration={duration}"])
+    mission = load_mission("okeefe_2013", [f"mission.duration={duration}", f"lockstep.realtime_factor={rate}"])
     with domains.hold_free("flight", "benchmark of the console") as held, contextlib.ExitStack() as stack:
         os.environ["ROS_DOMAIN_ID"] = str(held.domain)
         flight = stack.enter_context(ComposedFlight(mission))
@@ -101,16 +101,17 @@ def main() -> int:
     parser.add_argument(
         "--duration", type=float, default=2000.0, metavar="S", help="simulated time [s] (default: 2000)"
     )
+    parser.add_argument("--rate", type=float, default=0.0, help="times real time; 0: as fast as it goes (default)")
     parser.add_argument("--ways", nargs="+", choices=WAYS, default=WAYS, metavar="WAY", help="default: all")
     parser.add_argument("--json", action="store_true", help="print the medians as one JSON object on the last line")
     options = parser.parse_args()
     libraries = provide(print)
-    fly(ALONE, 10.0, libraries)  # loads what there is to load
+    fly(ALONE, 10.0, 0.0, libraries)  # loads what there is to load
     ways = [way for way in WAYS if way in (ALONE, *options.ways)]
     runs: dict[str, list[dict[str, float]]] = {way: [] for way in ways}
     for number in range(options.rounds):
         for way in ways[number % len(ways) :] + ways[: number % len(ways)]:
-            runs[way].append(fly(way, options.duration, libraries))
+            runs[way].append(fly(way, options.duration, options.rate, libraries))
             print(f"{way}: {runs[way][-1]}", file=sys.stderr, flush=True)
     print(f"{options.duration:g} s of okeefe_2013, medians of {options.rounds} flights; browser: share of a processor")
     table = {}

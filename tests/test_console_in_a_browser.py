@@ -29,6 +29,21 @@ TIME = "parseFloat(document.getElementById('time').textContent)"
 ERROR = "parseFloat(document.getElementById('error').textContent)"
 
 
+# A parameter whose value comes after its name; gives what is ordered when a number is put into its place.
+_VALUE_KNOWN_LATER = """(async () => {
+  const { Controls } = await import("./controls.js");
+  const ordered = [];
+  const controls = Object.create(Controls.prototype);
+  Object.assign(controls, { order: (fields) => ordered.push(fields.value), tell() {} });
+  for (const value of [null, 0.5])
+    controls.parameters([{ node: "/made_up", name: "gate", value, what: "", expected: "" }]);
+  const input = document.querySelector('[data-key="/made_up gate"] input');
+  input.value = "0.25";
+  input.dispatchEvent(new Event("change"));
+  return ordered;
+})()"""
+
+
 class Page:
     """The console's page as somebody sees and uses it."""
 
@@ -88,6 +103,7 @@ def test_a_flight_is_seen_held_and_stepped():
         assert browser.evaluate(LAYOUT_FAULTS) == []
         assert page.complaints() == []
         own = running.address.rstrip("/")
+        assert browser.evaluate(_VALUE_KNOWN_LATER) == [0.25]
         assert [url for url in browser.requests if not url.replace("ws:", "http:").startswith(own)] == []
 
 

@@ -166,8 +166,11 @@ export class Controls {
     const known = new Map([...place.querySelectorAll(".parameter")].map((row) => [row.dataset.key, row]));
     for (const told of table) {
       const key = `${told.node} ${told.name}`;
-      const row = known.get(key) ?? this.parameterRow(place, told, key);
+      const before = known.get(key);
       known.delete(key);
+      // one whose value was not known yet had a place for any text
+      const row = before?.dataset.kind === kindOf(told.value) ? before : this.parameterRow(place, told, key);
+      if (before && before !== row) before.replaceWith(row);
       const input = row.querySelector("input");
       if (input === document.activeElement) continue;
       if (input.type === "checkbox") input.checked = told.value;
@@ -189,6 +192,7 @@ export class Controls {
     const row = document.createElement("div");
     row.className = "parameter";
     row.dataset.key = key;
+    row.dataset.kind = kindOf(told.value);
     const input = document.createElement("input");
     input.setAttribute("aria-label", `${told.node} ${told.name}`);
     const kind = typeof told.value;
@@ -212,6 +216,10 @@ export class Controls {
       if (wanted) group.open = true;
     }
   }
+}
+
+function kindOf(value) {
+  return Array.isArray(value) ? "list" : typeof value;
 }
 
 function valueOf(input, before) {
