@@ -125,6 +125,7 @@ _LONG = (
     "tests/test_three_hosts.py",
     "tests/test_without_ros.py::test_budgets",
     "tests/test_without_ros.py::test_layouts",
+    "tests/test_without_ros.py::test_pages_of_papers",
 )
 
 

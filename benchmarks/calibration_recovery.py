@@ -31,18 +31,17 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from uncalibrated import (
     Flown,
+    aid_error_ratios,
+    error_ratios,
     flown,
-    heading_errors,
-    measured,
+    mean_headings,
     mission_of,
     sun_alone,
-    true_common,
     true_parameters,
     without_truth,
 )
 
 from css_calibration.calibration import Calibration, calibrate
-from css_calibration.cell_fit_model import normals_of
 from css_calibration.errors import CalibrationError
 from css_calibration.recorded import Recorded
 
@@ -60,18 +59,6 @@ def first_part(recorded: Recorded) -> Recorded:
     return recorded.at(np.flatnonzero(recorded.time < _PART * recorded.time[-1]))
 
 
-def ratios(flight: Flown, c: Calibration) -> tuple[np.ndarray, np.ndarray]:
-    """(N, 4) errors over standard deviations, NaN where not observed; and of gyro and magnetometer."""
-    off = (c.fit.parameters - true_parameters(flight.mission)) / np.where(c.sigma > 0.0, c.sigma, 1.0)
-    of_cells = np.where(c.observed, off, np.nan)[:, :4]
-    true = true_common(flight.mission)
-    common = c.common()
-    if common is not None:
-        return of_cells, (common[0] - true) / common[1]
-    aids = [(b.x - t) / b.sigma for b, t in ((c.bias, true[:3]), (c.of_field, true[3:])) if b is not None]
-    return of_cells, np.concatenate(aids) if aids else np.zeros(0)
-
-
 def chi_square(flight: Flown, c: Calibration) -> tuple[float, int]:
     """Of the errors of all parameters of cells that were told, with their covariance, and how many these are."""
     unknowns = c.fit.unknowns
@@ -81,21 +68,6 @@ def chi_square(flight: Flown, c: Calibration) -> tuple[float, int]:
     covariance = c.fit.covariance[np.ix_(at, at)] * np.outer(unknowns.sigma[at], unknowns.sigma[at])
     off = (c.fit.parameters - true_parameters(flight.mission))[told]
     return float(off @ np.linalg.solve(covariance, off)), len(at)
-
-
-def headings(flight: Flown, c: Calibration, estimator: str) -> list[float]:
-    """Mean heading errors [deg] of an estimator on the last part: nominal, calibrated, known cells."""
-    after_s = _PART * flight.recorded.time[-1]
-    nominal = c.data.normals_b
-    unit = ["sun_filter.response.scale=1.0"]
-    found = measured(flight, c.parameters, normals_of(nominal, c.parameters))
-    true = true_parameters(flight.mission)
-    known = measured(flight, true, normals_of(nominal, true))
-    if estimator != "sun_filter":
-        unit = []
-    runs = ([], found + unit, known + unit)
-    errors = [np.degrees(heading_errors(flight, estimator, overrides, after_s)) for overrides in runs]
-    return [float(e.mean()) if len(e) else float("nan") for e in errors]
 
 
 def main() -> int:
@@ -117,11 +89,12 @@ def main() -> int:
             print(f"case {case}: {error}", flush=True)
             refused += 1
             continue
-        of_cells, of_aids = ratios(flight, c)
+        of_cells = error_ratios(flight, c)[:, : len(_NAMES)]
         cells.append(of_cells)
-        aids.append(of_aids)
+        aids.append(aid_error_ratios(flight, c))
         joint.append(chi_square(flight, c))
-        errors.append([headings(flight, c, name) for name in _ESTIMATORS])
+        after_s = _PART * flight.recorded.time[-1]
+        errors.append([np.degrees(mean_headings(flight, c, name, after_s)) for name in _ESTIMATORS])
         worst = np.nanmax(np.abs(of_cells)) if np.isfinite(of_cells).any() else float("nan")
         shown = "; ".join(" ".join(f"{e:.3f}" for e in row) for row in errors[-1])
         told, wall_s = np.isfinite(of_cells).mean(), time.monotonic() - began

@@ -165,6 +165,13 @@ def test_pages_of_recordings(both, tmp_path):
     assert_same_files(tmp_path, "page.html")
 
 
+def test_pages_of_papers(both, tmp_path):
+    outputs = both("reproduce", "esprit", "--quick", "--cases", "2", "--out", "page", "--json")
+    assert result(outputs[0]) == result(outputs[1])
+    assert len(result(outputs[0])["rows"]) > 5
+    assert files(tmp_path / "with").keys() == files(tmp_path / "without").keys()
+
+
 def test_calibrations(both, tmp_path):
     # 1: a recording of three minutes tells little, and the heading is no better for it
     outputs = both("calibrate", REFERENCE, "--out", "cells.yaml", "--json", expected=(0, 1))

@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from css_calibration.cell_fit_model import DARK, GAIN, TILT_1, TILT_2, nominal_parameters
+from css_calibration.calibration import Calibration
+from css_calibration.cell_fit_model import DARK, GAIN, TILT_1, TILT_2, nominal_parameters, normals_of
 from css_calibration.recorded import Recorded, recorded_of
 from css_common.codec import codec_of
 from css_common.component import Cycles
@@ -134,3 +135,31 @@ def heading_errors(flight: Flown, estimator: str, overrides: list[str], after_s:
     counts = (truth.illumination > 0.999) & (flight.recorded.time >= after_s) & (estimates.validity != 0)
     a, b = estimates.sun_b[counts], sun_b[counts]
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1))
+
+
+def error_ratios(flight: Flown, c: Calibration) -> np.ndarray:
+    """(N, 5) errors of parameters over their standard deviations, NaN where they were not told."""
+    off = c.fit.parameters - true_parameters(flight.mission)
+    told = c.observed & (c.sigma > 0.0)
+    return np.where(told, off / np.where(told, c.sigma, 1.0), np.nan)
+
+
+def aid_error_ratios(flight: Flown, c: Calibration) -> np.ndarray:
+    """The same of gyro and magnetometer, as many as were told."""
+    true = true_common(flight.mission)
+    common = c.common()
+    if common is not None:
+        return np.asarray((common[0] - true) / common[1])
+    aids = [(b.x - t) / b.sigma for b, t in ((c.bias, true[:3]), (c.of_field, true[3:])) if b is not None]
+    return np.concatenate(aids) if aids else np.zeros(0)
+
+
+def mean_headings(flight: Flown, c: Calibration, estimator: str, after_s: float) -> tuple[float, float, float]:
+    """Mean heading errors [rad] of an estimator from a time on: nominal cells, calibrated ones, known ones; or NaN."""
+    true, nominal = true_parameters(flight.mission), c.data.normals_b
+    # the mean loss is part of the scales
+    unit = ["sun_filter.response.scale=1.0"] if estimator == "sun_filter" else []
+    runs = ([], *([*measured(flight, p, normals_of(nominal, p)), *unit] for p in (c.parameters, true)))
+    errors = [heading_errors(flight, estimator, overrides, after_s) for overrides in runs]
+    before, after, known = (float(e.mean()) if len(e) else float("nan") for e in errors)
+    return before, after, known

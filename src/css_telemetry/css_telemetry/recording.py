@@ -9,6 +9,7 @@ calibration tells of its sensors, and nothing else.
 
 import json
 import re
+import shutil
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -78,18 +79,25 @@ def write_recording(
     }
     progress = ProgressLines(f"writing {folder}", "lines of telemetry")
     count = len(telemetry.stamps_ns)
-    with BagWriter(folder, topics, metadata, overwrite=overwrite) as writer:
-        place = {int(row): k for k, row in enumerate(states.rows)} if states is not None else {}
-        blind = telemetry.blind
-        for row in range(count):
-            stamp_ns = int(telemetry.stamps_ns[row])
-            if states is not None and row in place:
-                writer.write(TRUTH.name, stamp_ns, _truth(states, place[row], stamp_ns))
-            for topic, data in _measured(telemetry, row, stamp_ns, bool(blind[row])):
-                writer.write(topic.name, stamp_ns, data)
-            if row % 1000 == 0:
-                progress.tell(row, count)
-        return writer.counts
+    begun = False
+    try:
+        with BagWriter(folder, topics, metadata, overwrite=overwrite) as writer:
+            begun = True
+            place = {int(row): k for k, row in enumerate(states.rows)} if states is not None else {}
+            blind = telemetry.blind
+            for row in range(count):
+                stamp_ns = int(telemetry.stamps_ns[row])
+                if states is not None and row in place:
+                    writer.write(TRUTH.name, stamp_ns, _truth(states, place[row], stamp_ns))
+                for topic, data in _measured(telemetry, row, stamp_ns, bool(blind[row])):
+                    writer.write(topic.name, stamp_ns, data)
+                if row % 1000 == 0:
+                    progress.tell(row, count)
+            return writer.counts
+    except KeyboardInterrupt:
+        if begun:  # closed as it is, a part of the table would pass for all of it
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def mission_text(

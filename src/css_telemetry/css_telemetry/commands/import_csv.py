@@ -2,6 +2,7 @@
 """Turns a table of telemetry into a recording. `import_csv --help` tells how it is used."""
 
 import math
+import signal
 import sys
 from collections.abc import Sequence
 
@@ -40,7 +41,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.layout is None and not options.describe:
         parser.error("a description or layout of the cells is missing; --describe proposes one")
     run = implementation("css_telemetry.verbs.import_csv")
-    return guarded(parser.prog, lambda: run(parser, options), ())
+    # a killed terminal or `kill` end it as Ctrl-C does
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    return guarded(parser.prog, lambda: run(parser, options), (), interrupted="interrupted; nothing written")
 
 
 def _parser() -> CommandParser:
