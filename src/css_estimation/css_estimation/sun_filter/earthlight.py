@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.attitude import dcm_to_mrp
-from css_common.declared import builder, given, part, table_of
+from css_common.declared import builder, given, merged, part, table_of
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, matmul, multiply, transpose
 from css_estimation.attitude.attitude_solution import (
@@ -49,7 +49,7 @@ class EarthlightParameters(NamedTuple):
     cells: CellHealthParameters = part(CellHealthParameters)
 
 
-PARAMETERS = table_of(EarthlightParameters)
+PARAMETERS = merged(options.PARAMETERS, table_of(EarthlightParameters))
 parameters = builder(EarthlightParameters)
 
 _NO_BIAS: Vec3 = (0.0, 0.0, 0.0)
