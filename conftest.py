@@ -105,6 +105,7 @@ _LONG = (
     "tests/test_killed_supervisor.py::test_nothing_is_left_of_a_flight_whose_supervisor_is_killed[some",
     "tests/test_link_faults.py::test_a_flight_is_the_same_in_processes",
     "tests/test_link_faults.py::test_processes_die_hang_and_are_slow_at_their_time",
+    "tests/test_masks_of_attitude_filters.py::test_earthlight",
     "tests/test_monte_carlo_flies_as_the_graph.py::test_a_dispersed_case_equals_that_of_the_composed_graph[so",
     "tests/test_monte_carlo_flies_as_the_graph.py::test_a_harder_truth_equals_the_composed_graph",
     "tests/test_monte_carlo_flies_as_the_graph.py::test_every_step_of_a_case_equals_that_of_the_composed_graph[s",

@@ -32,11 +32,12 @@ class SunFilterFlight:
 
     def __init__(self, sun_b=(0.0, 0.6, 0.8), omega=(0.0, 0.0, 0.0), seed=1, white=0.0, earth=None, **changes):
         self.p = self.algorithm.parameters(okeefe_values(SunFilter.table(), **changes))
+        self.filter = getattr(self.p, "filter", self.p)  # of what carries one
         self.state = self.algorithm.initial_state(self.p)
         self.memory = self.algorithm.initial_memory(self.p)
         self.sun_n = unit((1.0, 0.0, 0.0))
         self.dcm_bn = _onto(unit(sun_b), self.sun_n)
-        self.momentum_n = multiply(_transposed(self.dcm_bn), multiply(self.p.motion.inertia, omega))
+        self.momentum_n = multiply(_transposed(self.dcm_bn), multiply(self.filter.motion.inertia, omega))
         self.wheels_b = np.zeros(3)
         self.dice = np.random.default_rng(seed)
         self.white = white
@@ -57,13 +58,13 @@ class SunFilterFlight:
     def omega(self):
         """The true rate."""
         momentum_b = np.array(multiply(self.dcm_bn, self.momentum_n)) - self.wheels_b
-        return multiply(self.p.motion.inverse_inertia, tuple(momentum_b))
+        return multiply(self.filter.motion.inverse_inertia, tuple(momentum_b))
 
     def voltages(self, part=1.0):
         """Outputs of this cycle, with part of the Sun's disc in view."""
-        outputs = part * outputs_of(self.p, self.sun_b)
+        outputs = part * outputs_of(self.filter, self.sun_b)
         if self.sky.known:
-            albedo, p = np.zeros(len(outputs)), self.p
+            albedo, p = np.zeros(len(outputs)), self.filter
             albedo_output(self.light, p.cells, p.screen, p.cos_half_view, self.dcm_bn, new_workspace(), albedo)
             outputs = outputs + part * albedo
         return outputs + self.white * self.dice.normal(size=len(outputs))
@@ -74,12 +75,12 @@ class SunFilterFlight:
         for _ in range(4):
             middle = matmul(rotation_vector_to_dcm(tuple(0.125 * DT * omega)), self.dcm_bn)
             momentum_b = np.array(multiply(middle, self.momentum_n)) - self.wheels_b
-            omega = np.array(multiply(self.p.motion.inverse_inertia, tuple(momentum_b)))
+            omega = np.array(multiply(self.filter.motion.inverse_inertia, tuple(momentum_b)))
             self.dcm_bn = matmul(rotation_vector_to_dcm(tuple(0.25 * DT * omega)), self.dcm_bn)
         voltages = self.voltages(part)
         if change is not None:
             change(voltages)
-        axes = np.column_stack([self.p.motion.wheels[name] for name in ("hx", "hy", "hz")])
+        axes = np.column_stack([self.filter.motion.wheels[name] for name in ("hx", "hy", "hz")])
         aiding = UNAIDED._replace(
             gyro_b=self.omega,
             gyro_valid=gyro,

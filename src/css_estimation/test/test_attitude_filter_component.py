@@ -78,8 +78,10 @@ def test_topics():
     assert (cells.topic, cells.required, cells.lengths) == ("css/voltages", True, {"voltages": 6})
     assert (gyro.topic, gyro.required) == ("gyro/imu", False)
     assert (field.topic, field.required, field.divider) == ("mag/field", False, 5)
-    (output,) = AttitudeFilter.outputs("left", values)
+    output, told = AttitudeFilter.outputs("left", values)
     assert output.topic == "left/attitude" and output.ends_cycle
+    assert (told.topic, told.events) == ("health/left", True)
+    assert AttitudeFilter.outputs("left", values_of(magnetometer__divider=5, health__enabled=False)) == (output,)
 
 
 @pytest.mark.parametrize("sensors", [{"gyro": False}, {"field": False}])

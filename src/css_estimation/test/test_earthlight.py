@@ -10,7 +10,7 @@ from sun_filter_flight import SunFilterFlight
 from css_common.attitude import dcm_to_mrp
 from css_common.vectors import unit
 from css_estimation.attitude.attitude_solution import VALIDITY_HELD, VALIDITY_NONE, VALIDITY_VALID
-from css_estimation.sun_filter import earthlight
+from css_estimation.sun_filter import earthlight, options
 
 TURNING = (0.004, -0.003, 0.002)
 
@@ -66,3 +66,7 @@ def test_without_an_orbit_there_is_no_attitude():
     body = flight()
     body.sky = body.sky._replace(known=False)
     assert body.fly(100.0, gyro=True).validity == VALIDITY_NONE
+
+
+def test_it_has_all_parameters_of_the_filter_that_it_carries():
+    assert {parameter.name for parameter in options.PARAMETERS} <= {p.name for p in earthlight.PARAMETERS}

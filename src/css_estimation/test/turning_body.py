@@ -49,7 +49,7 @@ class Body:
         shape = self.normals.shape
         tilted = self.normals + np.cross(np.radians(1.0) * self.random.standard_normal(shape), self.normals)
         self.true_normals = tilted / np.linalg.norm(tilted, axis=1)[:, np.newaxis]
-        self.gains = 1.0 + 0.02 * self.random.standard_normal(shape[0])
+        self.gains = 1.0 + 0.02 * self.random.standard_normal(shape[:1])
         self.earth_light = 0.25
         return self
 

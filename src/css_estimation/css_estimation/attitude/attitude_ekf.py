@@ -45,11 +45,14 @@ from css_estimation.attitude.attitude_solution import (
     AttitudeState,
     with_alignment,
     with_attitude,
+    with_cells,
     with_search,
 )
 from css_estimation.attitude.attitude_update import Tally, find_start, measure
 from css_estimation.attitude.field_direction import plausible_field
 from css_estimation.attitude.flight_references import References
+from css_estimation.health.cell_health import trust_cells
+from css_estimation.health.cell_memory import CellHealthState
 from css_estimation.sun import cell_calibration
 from css_estimation.sun.error_covariance import (
     ATTITUDE,
@@ -60,12 +63,15 @@ from css_estimation.sun.error_covariance import (
     propagate,
     set_block,
 )
+from css_estimation.sun.sun_heading import PREDICTION_ECLIPSED, PREDICTION_SUNLIT, RATE_GYRO, RATE_NONE, Sky
 from css_estimation.sun.sun_tracking import is_body_rate
 from css_estimation.symmetric import isotropic, trace
 
 # Trace of the attitude covariance [rad^2] beyond which a fresh start is better: 33 deg for each axis.
 _USELESS = 1.0
 _LONGEST_SPAN = 1e9
+_HALF, _NOT_ALL = 0.5, 0.99  # of the Sun's disc
+_NOWHERE: Vec3 = (0.0, 0.0, 0.0)
 # After so long without field or Sun the search is given up, and a wide attitude is narrowed by what there is [s].
 _LONGEST_IDLE = 30.0
 
@@ -118,6 +124,8 @@ def step(
     """
     dt = min(dt, _LONGEST_SPAN) if dt > 0.0 else 0.0
     gyro_ok = _gyro_usable(p, gyro_b, gyro_valid)
+    state = with_cells(state, _judge_cells(p, state, memory, dt, voltages, gyro_b, gyro_ok, references, light))
+    outputs = memory.health.trusted
     if state.started or state.search.begun:
         state = _predict(p, state, memory, dt, gyro_b, gyro_ok)
     field_ok = field_valid and plausible_field(field_b) and plausible_field(references.field_n)
@@ -125,24 +133,46 @@ def step(
     started_now = False
     distrusted = state.contradicted > p.restart_after
     if not state.aligned or distrusted or trace(attitude_block(memory.covariance)) > _USELESS:
-        begun, mask = find_start(p, memory, voltages, field_b, field_ok, references)
+        begun, mask = find_start(p, memory, outputs, field_b, field_ok, references)
         if begun.found:
             started_now = True
             state = begun_at(p, state, memory, dcm_to_mrp(begun.dcm_bn), begun.covariance, distrusted)
             state = with_search(state, False, roll_search.no_search())
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN)
     if not state.confirmed and field_ok:
-        state, moved, mask = search_roll(p, state, memory, dt, voltages, field_b, references, light)
+        state, moved, mask = search_roll(p, state, memory, dt, outputs, field_b, references, light)
         if moved:
             started_now = True
             tally = Tally(0.0, 0, False, mask, USED_FIELD | USED_SUN if mask != 0 else USED_FIELD)
     if state.aligned and not started_now:
         narrow = state.confirmed or trace(attitude_block(memory.covariance)) < p.gated_below
         sun_too = narrow or not state.search.begun or state.search.idle > _LONGEST_IDLE
-        state, tally = measure(p, state, memory, voltages, field_b, field_ok, sun_too, references, light)
+        state, tally = measure(p, state, memory, outputs, field_b, field_ok, sun_too, references, light)
         state = judged(state, tally, dt)
     bound(memory.covariance, memory.largest)
     return _finish(state, gyro_b, gyro_ok, dt, started_now, tally)
+
+
+@kernel
+def _judge_cells(
+    p: AttitudeParameters,
+    state: AttitudeState,
+    memory: AttitudeMemory,
+    dt: float,
+    voltages,
+    gyro_b: Vec3,
+    gyro_ok: bool,
+    references: References,
+    light,
+) -> CellHealthState:
+    """Health of the cells after this cycle; what can be trusted of their outputs is then in its memory."""
+    r = references
+    part = 1.0 if r.sunlit else min(r.intensity, _NOT_ALL)
+    predicted = PREDICTION_ECLIPSED if part < _HALF else PREDICTION_SUNLIT
+    sky = Sky(True, predicted, r.sun_n, r.intensity, part, _NOWHERE, r.field_n, light)
+    rate = subtract(gyro_b, state.bias_b) if gyro_ok else state.omega_bn_b
+    source = RATE_GYRO if gyro_ok else RATE_NONE
+    return trust_cells(p.judges_cells, p.health, state.cells, memory.health, dt, voltages, rate, source, sky)
 
 
 @kernel
@@ -206,6 +236,7 @@ def _finish(
         state.contradicted,
         state.confirmed,
         state.search,
+        state.cells,
     )
     return after, AttitudeSolution(
         state.sigma_bn,
@@ -218,4 +249,5 @@ def _finish(
         validity,
         used,
         mode,
+        state.cells.isolated,
     )

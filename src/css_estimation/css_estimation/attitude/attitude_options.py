@@ -15,6 +15,7 @@ from css_estimation.attitude import slow_errors
 from css_estimation.attitude.cell_voltages import CellModel
 from css_estimation.attitude.flight_references import COMPENSATE
 from css_estimation.attitude.slow_errors import SlowErrors
+from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun import cell_calibration
 from css_estimation.sun.error_covariance import BIAS, FURTHER
 
@@ -130,6 +131,8 @@ class AttitudeParameters(NamedTuple):
     )
     compensates_albedo: bool = given(COMPENSATE)
     slow: SlowErrors = part(SlowErrors)
+    judges_cells: bool = given(ENABLED)
+    health: CellHealthParameters = part(CellHealthParameters)
 
 
 PARAMETERS = table_of(AttitudeParameters)

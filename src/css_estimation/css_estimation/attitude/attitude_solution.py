@@ -11,6 +11,8 @@ from css_environment.albedo import new_workspace
 from css_estimation.attitude.attitude_options import LOST_VARIANCE, AttitudeParameters, largest_variances
 from css_estimation.attitude.roll_search import RollSearch, new_weights, no_search
 from css_estimation.attitude.slow_errors import forget, new_slow
+from css_estimation.health import cell_health
+from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState, new_memory
 from css_estimation.sun import cell_calibration
 from css_estimation.sun.error_covariance import BIAS, FURTHER, new_work
 
@@ -46,6 +48,7 @@ class AttitudeState(NamedTuple):
     contradicted: float  # [s] for how long the field or the Sun has been refused
     confirmed: bool  # all rolls about the field have been weighed, and this one is it
     search: RollSearch
+    cells: CellHealthState
 
 
 class AttitudeMemory(NamedTuple):
@@ -61,6 +64,7 @@ class AttitudeMemory(NamedTuple):
     albedo: np.ndarray  # (N,) room for predicted light of the Earth
     albedo_slopes: np.ndarray  # (N, 3) room for its derivatives
     albedo_work: np.ndarray  # (224,) room for its prediction
+    health: CellHealthMemory
 
 
 class AttitudeSolution(NamedTuple):
@@ -76,13 +80,15 @@ class AttitudeSolution(NamedTuple):
     validity: int
     used: int
     mode: int
+    isolated: int = 0  # bit i: cell i is held for failed
 
 
 def initial_state(p: AttitudeParameters) -> AttitudeState:
     """Nothing known, or the given attitude."""
     given = p.start.is_given
     sigma_bn = p.start.sigma_bn if given else _ZERO
-    return AttitudeState(given, given, sigma_bn, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0, False, no_search())
+    cells = cell_health.initial_state()
+    return AttitudeState(given, given, sigma_bn, _ZERO, _ZERO, _ZERO, False, 0.0, 0.0, False, no_search(), cells)
 
 
 def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
@@ -111,6 +117,7 @@ def initial_memory(p: AttitudeParameters) -> AttitudeMemory:
         albedo=np.zeros(cells),
         albedo_slopes=np.zeros((cells, 3)),
         albedo_work=new_workspace(),
+        health=new_memory(cells),
     )
 
 
@@ -130,6 +137,7 @@ def with_attitude(state: AttitudeState, sigma_bn: Vec3, bias_b: Vec3) -> Attitud
         s.contradicted,
         s.confirmed,
         s.search,
+        s.cells,
     )
 
 
@@ -149,6 +157,7 @@ def with_alignment(state: AttitudeState, aligned: bool, contradicted: float) -> 
         contradicted,
         s.confirmed,
         s.search,
+        s.cells,
     )
 
 
@@ -168,4 +177,25 @@ def with_search(state: AttitudeState, confirmed: bool, search: RollSearch) -> At
         s.contradicted,
         confirmed,
         search,
+        s.cells,
+    )
+
+
+@kernel
+def with_cells(state: AttitudeState, cells: CellHealthState) -> AttitudeState:
+    """The state with another health of the cells."""
+    s = state
+    return AttitudeState(
+        s.started,
+        s.aligned,
+        s.sigma_bn,
+        s.bias_b,
+        s.omega_bn_b,
+        s.gyro_b,
+        s.gyro_known,
+        s.age,
+        s.contradicted,
+        s.confirmed,
+        s.search,
+        cells,
     )

@@ -3,21 +3,26 @@
 
 Three or more lit cells that span space give it by least squares; of cells in a plane two Suns fit, between which the
 angle to the field and the dark cells decide (`attitude_start`). The light of the Earth is not taken off: it is part of
-the error of a cell.
+the error of a cell. Cells that are held for failed are left out (`cell_health`), judged without any rate.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from css_common.declared import built, given, made, table_of
+from css_common.declared import built, given, made, part, table_of
 from css_common.kernel import typed_call
 from css_common.schema import Values, real
 from css_common.vectors import Vec3, dot, norm, scale
 from css_environment.ephemeris import EnvironmentState
 from css_estimation.attitude.attitude_start import chosen_sun
 from css_estimation.attitude.lit_sun_vector import lit_sun
+from css_estimation.health import cell_health
+from css_estimation.health.cell_health import trust_cells
+from css_estimation.health.cell_memory import new_memory
+from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.sun.cell_layout import brightest, cell_layout
+from css_estimation.sun.sun_heading import RATE_NONE, UNKNOWN_SKY
 from css_estimation.symmetric import Symmetric, isotropic
 
 _FULL_DISC = 0.99
@@ -45,6 +50,8 @@ class CellSunParameters(NamedTuple):
             high=1.0,
         )
     )
+    judges_cells: bool = given(ENABLED)
+    health: CellHealthParameters = part(CellHealthParameters)
     field_variance: float = made(
         _tesla_squared,
         real(
@@ -75,6 +82,8 @@ class CellSun:
 
     Attributes:
         field_variance: least variance of each component of the field [T^2].
+        verdicts: (N,) of `css_common.health.VERDICT`.
+        cycles: so far.
     """
 
     def __init__(self, values: Values) -> None:
@@ -83,6 +92,25 @@ class CellSun:
         self._cells = cell_layout(values).cells
         self.field_variance = self._p.field_variance
         self._lit_sun, self._chosen = typed_call(lit_sun), typed_call(chosen_sun)
+        self._judge = typed_call(trust_cells)
+        self._state, self._memory = cell_health.initial_state(), new_memory(len(self._cells))
+        self.verdicts, self.cycles = self._memory.verdicts, 0
+
+    def trusted(self, voltages: np.ndarray, dt: float, at: EnvironmentState) -> np.ndarray:
+        """The outputs (N,) of a cycle that can be trusted, NaN for the others.
+
+        Args:
+            voltages: (N,) outputs, NaN where a cell is missing.
+            dt: [s] since the last cycle.
+            at: what the models say at its stamp.
+        """
+        sky = UNKNOWN_SKY._replace(known=True, illumination=float(at.illumination))
+        p = self._p
+        self._state = self._judge(
+            p.judges_cells, p.health, self._state, self._memory, dt, voltages, (0.0, 0.0, 0.0), RATE_NONE, sky
+        )
+        self.cycles += 1
+        return self._memory.trusted
 
     def seen(self, voltages: np.ndarray, field_b: Vec3, at: EnvironmentState) -> SeenSun | None:
         """The Sun of a stamp; None when the cells do not tell it, or the Earth hides a part of it.

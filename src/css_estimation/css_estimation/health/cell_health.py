@@ -40,7 +40,6 @@ from css_estimation.health.cell_signals import in_range, note_outputs
 from css_estimation.health.cell_votes import judge_votes
 from css_estimation.health.common_darkness import (
     LATE,
-    follow_light_of_day,
     judge_darkness,
     judge_lasting_darkness,
     see_light_again,
@@ -64,7 +63,7 @@ def initial_state() -> CellHealthState:
     """Nothing seen yet."""
     covariance = isotropic.py_func(1.0)
     track = Track(PHASE_LOOKING, 0.0, 0.0, 0.0, 0.0, 0.0, (0.0, 0.0, 1.0), covariance, 1.0, IDENTITY)
-    return CellHealthState(track, _ZERO, 0.0, 0.0, NO_DARKNESS, 0, 0, math.inf)
+    return CellHealthState(track, _ZERO, 0.0, 0.0, 0.0, NO_DARKNESS, 0, 0, math.inf)
 
 
 @kernel
@@ -95,17 +94,38 @@ def watch_cells(
     window, step = state.window + dt, state.step + 1
     track, isolated = state.track, state.isolated
     night = state.night + dt if sky.known and sky.illumination <= 0.0 else 0.0
-    darkness = follow_light_of_day(state.darkness, dt, sky)
+    day = state.day + dt if sky.known and sky.illumination >= 1.0 else 0.0
+    darkness = state.darkness
     if window > _LOOK or step == 1:
         track = carried(track, turn_b, window, rate_sure)
-        track, darkness = _look(p, memory, track, darkness, window, rate_sure, step, sky, night > LATE)
+        track, darkness = _look(p, memory, track, darkness, day, window, rate_sure, step, sky, night > LATE)
         isolated = isolated_mask(memory)
         turn_b, window = _ZERO, 0.0
     for i in range(voltages.shape[0]):
         v = voltages[i]
         left_out = memory.verdicts[i].held == 1 or not in_range(p, v)
         memory.trusted[i] = math.nan if left_out else v
-    return CellHealthState(track, turn_b, window, night, darkness, step, isolated, least_change)
+    return CellHealthState(track, turn_b, window, night, day, darkness, step, isolated, least_change)
+
+
+@kernel
+def trust_cells(
+    judges: bool,
+    p: CellHealthParameters,
+    state: CellHealthState,
+    memory: CellHealthMemory,
+    dt: float,
+    voltages,
+    omega_bn_b: Vec3,
+    rate_source: int,
+    sky: Sky,
+) -> CellHealthState:
+    """As `watch_cells` if it `judges`; else all outputs are trusted."""
+    if judges:
+        return watch_cells(p, state, memory, dt, voltages, omega_bn_b, rate_source, sky)
+    for i in range(voltages.shape[0]):
+        memory.trusted[i] = voltages[i]
+    return state
 
 
 @kernel
@@ -114,6 +134,7 @@ def _look(
     memory: CellHealthMemory,
     track: Track,
     darkness: Darkness,
+    day: float,
     window: float,
     rate_sure: bool,
     step: int,
@@ -136,7 +157,7 @@ def _look(
         if used and mean > SHOWS:
             bright += 1
     judge_votes(p, memory, track, min(window, MOST_AT_ONCE), step)
-    darkness = judge_darkness(p, memory, track, darkness, window, rate_sure, step)
+    darkness = judge_darkness(p, memory, track, darkness, day, window, rate_sure, step)
     darkness = judge_lasting_darkness(p, memory, darkness, window, top > p.minimum, sky, step)
     # one cell that is bright in the shadow fails; of several, the model of the orbit does
     if night and bright < 2:

@@ -109,7 +109,6 @@ class Track(NamedTuple):
 class Darkness(NamedTuple):
     """Of all cells together; see `common_darkness`."""
 
-    day: float  # [s] for which the model of the orbit has had all of the Sun
     waning: float  # [s] since a cell that must see the Sun had most of its light
     time: float  # [s] for which all that must see the Sun have been dark
     mask: int  # those cells
@@ -119,7 +118,7 @@ class Darkness(NamedTuple):
     lasting: bool  # it has outlasted all eclipses
 
 
-NO_DARKNESS = Darkness(0.0, 0.0, 0.0, 0, False, 0.0, 0, False)
+NO_DARKNESS = Darkness(0.0, 0.0, 0, False, 0.0, 0, False)
 
 
 class CellHealthState(NamedTuple):
@@ -129,6 +128,7 @@ class CellHealthState(NamedTuple):
     turn_b: Vec3  # [rad] since the last look
     window: float  # [s] since the last look
     night: float  # [s] for which the model of the orbit has had no Sun
+    day: float  # [s] for which it has had all of it
     darkness: Darkness
     step: int  # number of this cycle
     isolated: int  # mask

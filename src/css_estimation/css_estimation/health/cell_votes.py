@@ -13,12 +13,13 @@ import math
 
 from css_common.health import EVIDENCE_OPPOSITE, EVIDENCE_VOTE
 from css_common.kernel import kernel
-from css_common.vectors import Vec3, norm, subtract
+from css_common.vectors import Vec3, dot
 from css_estimation.health.cell_evidence import FREE, MOST_SCORE, leave_out_by
 from css_estimation.health.cell_expectation import DOUBTFUL, MOST_SQUARED, SURE, expected
 from css_estimation.health.cell_memory import PHASE_SETTLED, CellHealthMemory, Track
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.sun.cell_layout import half_view_of, share_view
+from css_sensors.cells import IN_PLANE
 
 _USEFUL = 0.6  # difference [-] beyond which two cells say nothing about each other
 
@@ -32,12 +33,28 @@ def judge_votes(p: CellHealthParameters, memory: CellHealthMemory, track: Track,
         window: [s] that it counts for.
         step: number of this cycle.
     """
-    for i in range(memory.cells.shape[0]):
-        cell, output = memory.cells[i], memory.used[i]
+    # to hand parameters to a function takes longer than what it would find out of healthy cells
+    layout, used, bound = p.layout.cells, memory.used, track.light + p.earth
+    half = max(p.layout.cos_half_view, 0.0)
+    together = 2.0 * half * half - 1.0 + IN_PLANE if p.layout.screen.views.shape[0] == 0 else 1.0
+    least = math.sqrt(FREE * 2.0 * (p.floor + p.heading * track.light * track.light))  # that adds to a score
+    for i in range(used.shape[0]):
+        cell, output = memory.cells[i], used[i]
         if math.isnan(output):
             continue
-        cell.vote = _added(cell.vote, _outvoted(p, memory, track, i), window)
-        cell.opposite = _added(cell.opposite, _alone(p, memory, i), window)
+        near = lit = False
+        one = layout[i]
+        for j in range(used.shape[0]):
+            other = layout[j]
+            cosine = one.nx * other.nx + one.ny * other.ny + one.nz * other.nz
+            # a NaN compares false
+            off = abs(output - used[j]) - least
+            if off > 0.0:
+                near = near or bound * bound * (2.0 - 2.0 * cosine) < min(off * off, _USEFUL * _USEFUL)
+            if output > p.earth and used[j] > p.earth:
+                lit = lit or cosine <= together or one.side * other.side < 0.0
+        cell.vote = _added(cell.vote, _outvoted(p, memory, track, i) if near else 0.0, window)
+        cell.opposite = _added(cell.opposite, _alone(p, memory, i) if lit else 0.0, window)
         if cell.vote == 0.0:
             cell.vote_step = step
         if cell.opposite == 0.0:
@@ -68,32 +85,38 @@ def _in_view(p: CellHealthParameters, track: Track, i: int) -> int:
 
 
 @kernel
-def _most_apart(p: CellHealthParameters, track: Track, i: int, j: int) -> float:
-    """Largest difference of the outputs of two healthy cells without errors [-]; infinite: any."""
-    most = (track.light + p.earth) * norm(subtract(_normal(p, i), _normal(p, j)))
-    if most > _USEFUL or (p.screened >> i | p.screened >> j) & 1 == 1:
-        return math.inf
+def _at_edges(p: CellHealthParameters, track: Track, i: int, j: int) -> float:
+    """What the outputs of two healthy cells may differ by for the edges of their views [-]; infinite: any."""
     first = _in_view(p, track, i)
     if first != DOUBTFUL and first == _in_view(p, track, j):
-        return most
+        return 0.0
     sides_differ = p.layout.cells[i].side != p.layout.cells[j].side
     if sides_differ or p.layout.screen.blocked.shape[0] > 0:
         return math.inf
-    edge = max(half_view_of(p.layout, i), half_view_of(p.layout, j), 0.0)
-    return most + track.light * edge
+    return track.light * max(half_view_of(p.layout, i), half_view_of(p.layout, j), 0.0)
 
 
 @kernel
 def _off(p: CellHealthParameters, track: Track, memory: CellHealthMemory, i: int, j: int) -> float:
     """Sigmas by which output `i` is above output `j` beyond what is possible, negative if below; NaN: no telling."""
-    most = _most_apart(p, track, i, j)
     one, other = memory.used[i], memory.used[j]
-    if math.isinf(most) or math.isnan(other):
+    apart = 2.0 - 2.0 * dot(_normal(p, i), _normal(p, j))
+    bound = track.light + p.earth
+    # a NaN compares false
+    if not bound * bound * apart < _USEFUL * _USEFUL or not abs(one - other) >= 0.0:
+        return math.nan
+    most = bound * math.sqrt(max(apart, 0.0))
+    if abs(one - other) <= most:
+        return 0.0
+    if (p.screened >> i | p.screened >> j) & 1 == 1:
+        return math.nan
+    excess = abs(one - other) - most - _at_edges(p, track, i, j)
+    if math.isinf(excess):
         return math.nan
     # the errors of both
     variance = 2.0 * (p.floor + p.heading * track.light * track.light) + p.share * (one * one + other * other)
-    excess = max(0.0, abs(one - other) - most) / math.sqrt(variance)
-    return excess if one > other else -excess
+    sigmas = max(0.0, excess) / math.sqrt(variance)
+    return sigmas if one > other else -sigmas
 
 
 @kernel

@@ -35,14 +35,6 @@ _BACK = 5.0  # [s] of light after which a cell that was dark is used again; twic
 
 
 @kernel
-def follow_light_of_day(darkness: Darkness, dt: float, sky: Sky) -> Darkness:
-    """After a cycle of `dt` [s]."""
-    day = darkness.day + dt if sky.known and sky.illumination >= 1.0 else 0.0
-    d = darkness
-    return Darkness(day, d.waning, d.time, d.mask, d.at_once, d.unlit, d.unlit_step, d.lasting)
-
-
-@kernel
 def _darkest(p: CellHealthParameters) -> float:
     """Output below which a cell gives nothing [-]."""
     return math.sqrt(p.gate * (p.floor + p.noise * p.noise))
@@ -85,7 +77,7 @@ def _given_up(memory: CellHealthMemory, darkness: Darkness, waning: float) -> Da
         if darkness.mask >> i & 1 and memory.verdicts[i].held == 0:
             drop_evidence(memory, i)
     d = darkness
-    return Darkness(d.day, waning, 0.0, 0, False, d.unlit, d.unlit_step, d.lasting)
+    return Darkness(waning, 0.0, 0, False, d.unlit, d.unlit_step, d.lasting)
 
 
 @kernel
@@ -94,6 +86,7 @@ def judge_darkness(
     memory: CellHealthMemory,
     track: Track,
     darkness: Darkness,
+    day: float,
     window: float,
     rate_sure: bool,
     step: int,
@@ -102,11 +95,12 @@ def judge_darkness(
 
     Args:
         track: before the outputs of this look.
+        day: [s] for which the model of the orbit has had all of the Sun.
         window: [s] since the look before.
         rate_sure: a gyro or the wheels tell how the body turns: nothing else does in the dark.
         step: number of this cycle.
     """
-    if track.phase != PHASE_SETTLED or not rate_sure or darkness.day <= LATE:
+    if track.phase != PHASE_SETTLED or not rate_sure or day <= LATE:
         return _given_up(memory, darkness, darkness.waning + window)
     told = _told(p, memory, track)
     waning = 0.0 if told.share >= _MOST_OF_IT else darkness.waning + window
@@ -123,7 +117,7 @@ def judge_darkness(
     if time > needed:
         _hold_dark(memory, mask, time, needed)
     d = darkness
-    return Darkness(d.day, waning, time, mask, at_once, d.unlit, d.unlit_step, d.lasting)
+    return Darkness(waning, time, mask, at_once, d.unlit, d.unlit_step, d.lasting)
 
 
 @kernel
@@ -155,7 +149,7 @@ def judge_lasting_darkness(
     """
     d = darkness
     if lit or sky.known:
-        return Darkness(d.day, d.waning, d.time, d.mask, d.at_once, 0.0, step, d.lasting and not lit)
+        return Darkness(d.waning, d.time, d.mask, d.at_once, 0.0, step, d.lasting and not lit)
     unlit, unlit_step, lasting = d.unlit + window, d.unlit_step, d.lasting
     if unlit > p.longest_eclipse and not lasting:
         if _sees_all(p):
@@ -168,7 +162,7 @@ def judge_lasting_darkness(
             lasting = True
         else:
             unlit, unlit_step = 0.0, step
-    return Darkness(d.day, d.waning, d.time, d.mask, d.at_once, unlit, unlit_step, lasting)
+    return Darkness(d.waning, d.time, d.mask, d.at_once, unlit, unlit_step, lasting)
 
 
 @kernel
@@ -208,4 +202,4 @@ def see_light_again(p: CellHealthParameters, memory: CellHealthMemory, darkness:
     for i in range(memory.cells.shape[0]):
         if memory.verdicts[i].held == 1 and memory.verdicts[i].evidence == EVIDENCE_COMMON:
             trust_again(memory, i)
-    return Darkness(d.day, d.waning, d.time, d.mask, d.at_once, 0.0, d.unlit_step, False)
+    return Darkness(d.waning, d.time, d.mask, d.at_once, 0.0, d.unlit_step, False)

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
 from css_common.declared import merged
+from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.run import node_main
@@ -15,6 +16,7 @@ from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input, gyro_input
 from css_estimation.attitude import attitude_ekf, attitude_options, flight_references
 from css_estimation.attitude.flight_references import FlightReferences
+from css_estimation.health.cell_options import ENABLED
 from css_estimation.messages import attitude_estimate_fields, cells_input
 from css_msgs.msg import AttitudeEstimate
 from css_sensors.calibrated_readings import CalibratedReadings, temperature_findings, temperature_inputs
@@ -38,7 +40,8 @@ class AttitudeFilter(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
+        attitude = Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True)
+        return (attitude, health_output(name)) if values[ENABLED] else (attitude,)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -61,6 +64,8 @@ class AttitudeFilter(Component):
         self._references = FlightReferences(self.values)
         self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
+        self._health = HealthReport() if self.values[ENABLED] else None
+        self._cycles = 0
 
     def tune(self, values: Values) -> None:
         super().tune(values)
@@ -90,7 +95,11 @@ class AttitudeFilter(Component):
             self._references.light,
         )
         fields = attitude_estimate_fields(solution, self._memory.covariance)
-        return {"attitude": self.message("attitude", stamp_ns, **fields)}
+        told: Outgoing = {}
+        if self._health is not None:
+            self._cycles += 1
+            told = self._health.told(self, stamp_ns, self._memory.health.verdicts, self._cycles)
+        return {"attitude": self.message("attitude", stamp_ns, **fields), **told}
 
 
 main = node_main(AttitudeFilter)

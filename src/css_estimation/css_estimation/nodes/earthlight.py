@@ -6,11 +6,13 @@ from types import ModuleType
 from typing import ClassVar
 
 from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
+from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.run import node_main
 from css_common.schema import Values
 from css_common.sections import needed_of_orbit, needed_of_wheel_momentum
+from css_estimation.health.cell_options import ENABLED
 from css_estimation.messages import attitude_estimate_fields
 from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.sun_estimator import aiding_of, inputs_of
@@ -32,7 +34,8 @@ class Earthlight(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
+        attitude = Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True)
+        return (attitude, health_output(name)) if values[ENABLED] else (attitude,)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -54,6 +57,8 @@ class Earthlight(Component):
         self._sky = flight_sky(self.values)
         self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
+        self._health = HealthReport() if self.values[ENABLED] else None
+        self._cycles = 0
 
     def tune(self, values: Values) -> None:
         super().tune(values)
@@ -76,7 +81,11 @@ class Earthlight(Component):
             aiding_of(received, sky_at(self._sky, stamp_ns), self._calibrated),
         )
         fields = attitude_estimate_fields(solution, self._memory.covariance)
-        return {"attitude": self.message("attitude", stamp_ns, **fields)}
+        told: Outgoing = {}
+        if self._health is not None:
+            self._cycles += 1
+            told = self._health.told(self, stamp_ns, self._memory.health.verdicts, self._cycles)
+        return {"attitude": self.message("attitude", stamp_ns, **fields), **told}
 
 
 main = node_main(Earthlight)

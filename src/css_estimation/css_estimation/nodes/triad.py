@@ -9,6 +9,7 @@ import numpy as np
 
 from css_common.attitude import dcm_to_quaternion
 from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
+from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.run import node_main
@@ -19,6 +20,7 @@ from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.attitude import cell_sun, flight_references, sun_field_attitude
 from css_estimation.attitude.sun_field_attitude import MODE_NONE, SunFieldAttitude
+from css_estimation.health.cell_options import ENABLED
 from css_estimation.messages import cells_input
 from css_estimation.symmetric import Symmetric, isotropic
 from css_msgs.msg import AttitudeEstimate, SlitSunAngle
@@ -70,7 +72,8 @@ class Triad(Component):
 
     @classmethod
     def outputs(cls, name: str, values: Values) -> tuple[Output, ...]:
-        return (Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True),)
+        attitude = Output("attitude", f"{name}/attitude", AttitudeEstimate, ends_cycle=True)
+        return (attitude, health_output(name)) if _is_by_cells(values) and values[ENABLED] else (attitude,)
 
     @classmethod
     def needed(cls, values: Values) -> tuple[str, ...]:
@@ -102,6 +105,8 @@ class Triad(Component):
         self._instant_ns = 0
         self._calibrated = CalibratedReadings(self.values)
         self._cell_sun = cell_sun.CellSun(self.values) if _is_by_cells(self.values) else None
+        self._health = HealthReport() if self._cell_sun is not None and self.values[ENABLED] else None
+        self._last_stamp_ns: int | None = None
         self._attitude = typed_call(sun_field_attitude.measured_attitude)
         self._interpolated = typed_call(sun_field_attitude.interpolated_field)
         self._variance = typed_call(sun_field_attitude.interpolated_variance)
@@ -119,17 +124,27 @@ class Triad(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         fresh = self._by_slits(stamp_ns, received) if self._cell_sun is None else self._by_cells(stamp_ns, received)
-        return {"attitude": self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))}
+        attitude = self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))
+        return {"attitude": attitude, **self._told_health(stamp_ns)}
+
+    def _told_health(self, stamp_ns: int) -> Outgoing:
+        if self._health is None or self._cell_sun is None:
+            return {}
+        return self._health.told(self, stamp_ns, self._cell_sun.verdicts, self._cell_sun.cycles)
 
     def _by_cells(self, stamp_ns: int, received: Received) -> bool:
         """The attitude of a stamp at which field and cells tell one; True when they do."""
         cells, field = received["cells"], received["field"]
         assert cells is not None and self._cell_sun is not None  # required inputs
+        since_ns = 0 if self._last_stamp_ns is None else stamp_ns - self._last_stamp_ns
+        self._last_stamp_ns = stamp_ns
+        at = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
+        voltages = self._cell_sun.trusted(
+            self._calibrated.cells(cells.voltages, received.get("temperature")), since_ns * 1e-9, at
+        )
         field_b, valid = self._calibrated.field(field)
         if field is None or not valid:
             return False
-        at = self._environment.at((stamp_ns - self.epoch_ns) * 1e-9)
-        voltages = self._calibrated.cells(cells.voltages, received.get("temperature"))
         seen = self._cell_sun.seen(voltages, field_b, at)
         if seen is None:
             return False

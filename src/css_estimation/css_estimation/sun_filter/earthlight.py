@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.attitude import dcm_to_mrp
-from css_common.declared import builder
+from css_common.declared import builder, given, merged, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Values
 from css_common.vectors import Vec3, matmul, multiply, transpose
 from css_estimation.attitude.attitude_solution import (
     USED_GYRO,
@@ -22,37 +21,52 @@ from css_estimation.attitude.attitude_solution import (
     VALIDITY_VALID,
     AttitudeSolution,
 )
-from css_estimation.sun.sun_heading import Aiding
+from css_estimation.health import cell_health
+from css_estimation.health.cell_health import trust_cells
+from css_estimation.health.cell_memory import CellHealthMemory, CellHealthState, new_memory
+from css_estimation.health.cell_options import ENABLED, CellHealthParameters
+from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, Aiding
+from css_estimation.sun.sun_tracking import elapsed
 from css_estimation.sun_filter import options, sun_filter
 from css_estimation.sun_filter.filter_state import MODE_EARTH, SunFilterState
 from css_estimation.sun_filter.hypotheses import the_only_one
 from css_estimation.sun_filter.memory import RATE, THETA, X_RATE, SunFilterMemory, attitude_block, dcm_of, triple
-from css_estimation.sun_filter.motion import RATE_BY_GYRO
+from css_estimation.sun_filter.motion import RATE_BY_GYRO, gyro_usable
 from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.sun_filter import knows_earth
 
-PARAMETERS = options.PARAMETERS
 conflicts = options.conflicts
-initial_state = sun_filter.initial_state
 
 AIDED_BY_SKY = True
 """`step` takes what a Sun estimator takes: `Aiding`, with the flight's own sky in it."""
 
-_built = builder(SunFilterParameters)
 
-
-class EarthlightParameters(SunFilterParameters):
+class EarthlightParameters(NamedTuple):
     """The parameters of this filter: by their type a study finds it."""
 
-    __slots__ = ()
+    filter: SunFilterParameters = part(SunFilterParameters)
+    judges_cells: bool = given(ENABLED)
+    cells: CellHealthParameters = part(CellHealthParameters)
 
 
-def parameters(values: Values) -> EarthlightParameters:
-    """Parameters from checked values."""
-    return EarthlightParameters(*_built(values))
-
+PARAMETERS = merged(options.PARAMETERS, table_of(EarthlightParameters))
+parameters = builder(EarthlightParameters)
 
 _NO_BIAS: Vec3 = (0.0, 0.0, 0.0)
+
+
+class EarthlightState(NamedTuple):
+    """Carried from cycle to cycle beside the memory."""
+
+    filter: SunFilterState
+    cells: CellHealthState
+    omega_bn_b: Vec3  # [rad/s] of the last cycle
+    rate_source: int  # of that
+
+
+def initial_state(p: EarthlightParameters) -> EarthlightState:
+    """Nothing known."""
+    return EarthlightState(sun_filter.initial_state(p.filter), cell_health.initial_state(), (0.0, 0.0, 0.0), RATE_NONE)
 
 
 class EarthlightMemory(NamedTuple):
@@ -60,11 +74,14 @@ class EarthlightMemory(NamedTuple):
 
     filter: SunFilterMemory
     covariance: np.ndarray  # (6, 6) of the attitude error [rad, rotation vector in b] and the gyro bias [rad/s]
+    health: CellHealthMemory
 
 
-def initial_memory(p: SunFilterParameters) -> EarthlightMemory:
+def initial_memory(p: EarthlightParameters) -> EarthlightMemory:
     """Nothing known."""
-    return EarthlightMemory(sun_filter.initial_memory(p), np.zeros((6, 6)))
+    return EarthlightMemory(
+        sun_filter.initial_memory(p.filter), np.zeros((6, 6)), new_memory(len(p.cells.layout.cells))
+    )
 
 
 @kernel
@@ -86,20 +103,34 @@ def _write_covariance(p: SunFilterParameters, x, covariance, by_gyro: bool, out)
 
 
 @kernel
+def _judge_cells(
+    p: EarthlightParameters, state: EarthlightState, memory: EarthlightMemory, dt: float, voltages, aiding: Aiding
+) -> CellHealthState:
+    """Health of the cells after this cycle; what can be trusted of their outputs is then in its memory."""
+    by_gyro = gyro_usable(p.filter.motion, aiding)
+    rate = aiding.gyro_b if by_gyro else state.omega_bn_b
+    source = RATE_GYRO if by_gyro else state.rate_source
+    return trust_cells(
+        p.judges_cells, p.cells, state.cells, memory.health, elapsed(dt), voltages, rate, source, aiding.sky
+    )
+
+
+@kernel
 def step(
-    p: SunFilterParameters, state: SunFilterState, memory: EarthlightMemory, dt: float, voltages, aiding: Aiding
-) -> tuple[SunFilterState, AttitudeSolution]:
+    p: EarthlightParameters, state: EarthlightState, memory: EarthlightMemory, dt: float, voltages, aiding: Aiding
+) -> tuple[EarthlightState, AttitudeSolution]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
-    state, heading = sun_filter.step(p, state, memory.filter, dt, voltages, aiding)
+    cells = _judge_cells(p, state, memory, dt, voltages, aiding)
+    after, heading = sun_filter.step(p.filter, state.filter, memory.filter, dt, memory.health.trusted, aiding)
     k = the_only_one(memory.filter)
-    by_gyro = state.rate.model == RATE_BY_GYRO
+    by_gyro = after.rate.model == RATE_BY_GYRO
     validity, used = VALIDITY_NONE, 0
     sigma_bn, bias_b = (0.0, 0.0, 0.0), _NO_BIAS
-    if k >= 0 and knows_earth(state):
+    if k >= 0 and knows_earth(after):
         x = memory.filter.estimates[k]
         sigma_bn = dcm_to_mrp(dcm_of(x))
         bias_b = triple(x, X_RATE) if by_gyro else _NO_BIAS
-        _write_covariance(p, x, memory.filter.covariances[k], by_gyro, memory.covariance)
+        _write_covariance(p.filter, x, memory.filter.covariances[k], by_gyro, memory.covariance)
         validity = VALIDITY_VALID if heading.mode == MODE_EARTH and heading.nis_dof > 0 else VALIDITY_HELD
         used = (USED_GYRO if by_gyro else 0) | (USED_SUN if heading.nis_dof > 0 else 0)
     solution = AttitudeSolution(
@@ -113,5 +144,6 @@ def step(
         validity,
         used,
         heading.mode,
+        cells.isolated,
     )
-    return state, solution
+    return EarthlightState(after, cells, heading.omega_bn_b, heading.rate_source), solution
