@@ -25,6 +25,7 @@ _RED, _PLAIN = "\x1b[31m", "\x1b[0m"
 _VALUES = re.compile(r"-(\.?\d|[xyz](,|$))")
 _PAIR = re.compile(r"[A-Za-z_]\w*(\.\w+)*=")
 _PAIRS = "KEY="  # begins the metavar of an option that takes such
+_OF_LISTS = type(argparse.ArgumentParser().add_argument("--any", action="append"))
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -51,10 +52,8 @@ class CommandParser(argparse.ArgumentParser):
 
     def _each_with_its_option(self, words: Sequence[str]) -> list[str]:
         names = [name for action in self._actions for name in action.option_strings]
-        pairs = {
-            name for action in self._actions for name in action.option_strings
-            if isinstance(action, argparse._AppendAction) and str(action.metavar).startswith(_PAIRS)
-        }  # fmt: skip
+        lists = [action for action in self._actions if isinstance(action, _OF_LISTS)]
+        pairs = {name for action in lists if str(action.metavar).startswith(_PAIRS) for name in action.option_strings}
         spread: list[str] = []
         option, has_value = "", False
         for number, word in enumerate(words):

@@ -12,6 +12,8 @@ _LABEL = re.compile(rf"^({NAME}):")
 _RESULT = re.compile(rf"^(%{NAME}) = (.*)$")
 _TARGETS = re.compile(rf"label %({NAME})")
 _CALLEE = re.compile(rf"^[^@]*?@({NAME})\(")
+_RAISED = re.compile(rf"^(%{NAME}) = (?:tail )?call .*@llvm\.uadd\.with\.overflow\.(i\d+)\(i\d+ ({VALUE}), i\d+ 1\)")
+_TAKEN_OUT = re.compile(rf"^(%{NAME}) = extractvalue \{{ i\d+, i1 \}} (%{NAME}), ([01])$")
 _BRACKETS = {"(": 1, "{": 1, "[": 1, "<": 1, ")": -1, "}": -1, "]": -1, ">": -1}
 _CALL_WORDS = ("tail", "musttail", "notail")
 
@@ -74,6 +76,7 @@ def functions_of(text: str) -> dict[str, Code]:
 def _blocks(lines: Iterator[tuple[int, str]]) -> dict[str, Block]:
     blocks: dict[str, Block] = {}
     block: Block | None = None
+    raised: dict[str, tuple[str, str]] = {}
     for at, line in lines:
         if line == "}":
             break
@@ -89,6 +92,7 @@ def _blocks(lines: Iterator[tuple[int, str]]) -> dict[str, Block]:
         told = line.strip()
         if told.startswith("switch ") and not told.endswith("]"):
             told += " ".join(["", *_until_closed(lines)])
+        told = _plainly(told, raised)
         result = _RESULT.match(told)
         opcode, _, rest = (result[2] if result else told).partition(" ")
         block.instructions.append(Instruction(result[1] if result else "", opcode, rest))
@@ -97,6 +101,22 @@ def _blocks(lines: Iterator[tuple[int, str]]) -> dict[str, Block]:
         if opcode in ("br", "switch"):
             block.successors = tuple(dict.fromkeys(plain(name) for name in _TARGETS.findall(rest)))
     return blocks
+
+
+def _plainly(told: str, raised: dict[str, tuple[str, str]]) -> str:
+    """An instruction; a sum with one and its overflow, by which LLVM counts rounds, as those of the number itself.
+
+    Args:
+        told: the instruction.
+        raised: pairs of such sums and overflows, each with the type and the number; changed.
+    """
+    made, taken = _RAISED.match(told), _TAKEN_OUT.match(told)
+    if made:
+        raised[made[1]] = made[2], made[3]
+    elif taken and taken[2] in raised:
+        kind, number = raised[taken[2]]
+        return f"{taken[1]} = " + (f"add {kind} {number}, 1" if taken[3] == "0" else f"icmp eq {kind} {number}, -1")
+    return told
 
 
 def _until_closed(lines: Iterator[tuple[int, str]]) -> Iterator[str]:

@@ -246,6 +246,28 @@ over:
     assert bound == Bound(4 + 3 * (28 // step) + 1) if bounded else bound.operations is None
 
 
+@pytest.mark.parametrize("rounds", [1, 6])
+def test_rounds_that_are_counted_up_to_an_overflow(rounds):
+    text = f"""
+define void @f(ptr %p) {{
+entry:
+  br label %head
+head:
+  %i = phi i64 [ -{rounds}, %entry ], [ %i.next, %back ]
+  %both = tail call {{ i64, i1 }} @llvm.uadd.with.overflow.i64(i64 %i, i64 1)
+  %i.next = extractvalue {{ i64, i1 }} %both, 0
+  %end = extractvalue {{ i64, i1 }} %both, 1
+  br i1 %end, label %over, label %back
+back:
+  br label %head
+over:
+  ret void
+}}
+"""
+    # entry 1; each round 4 at the head, and one behind it in all but the last; the end 1
+    assert bound_of(text, "f") == Bound(1 + 4 * rounds + (rounds - 1) + 1)
+
+
 def test_bits_that_are_taken_one_by_one():
     text = """
 define i64 @f(ptr %p, i64 %mask) {

@@ -81,8 +81,9 @@ def surely_spans_space(cells, mask: int) -> bool:
 @kernel
 def mirrored(span: Span, v: Vec3) -> Vec3:
     """Mirror image of a vector in a span: what gives the cells of that span the same outputs."""
-    for k in range(span.rank, 3):
-        v = subtract(v, scale(2.0 * dot(span.axes[k], v), span.axes[k]))
+    for k in range(3):
+        if k >= span.rank:
+            v = subtract(v, scale(2.0 * dot(span.axes[k], v), span.axes[k]))
     return v
 
 
@@ -96,8 +97,9 @@ def projection(layout: CellLayout, span: Span, voltages, mask: int) -> Vec3:
             cell = layout.cells[i]
             x = add(x, scale(voltages[i], (cell.nx, cell.ny, cell.nz)))
     found = (0.0, 0.0, 0.0)
-    for k in range(span.rank):
-        found = add(found, scale(dot(span.axes[k], x) / span.spread[k], span.axes[k]))
+    for k in range(3):
+        if k < span.rank:
+            found = add(found, scale(dot(span.axes[k], x) / span.spread[k], span.axes[k]))
     return found
 
 
@@ -128,8 +130,9 @@ def second_moment(
     off = subtract(scale(cosine, direction), heading_b)
     moment = add_outer((0.0, 0.0, 0.0, 0.0, 0.0, 0.0), 1.0, off)
     error = cell_sigma / max(length, cell_sigma)
-    for k in range(span.rank):
-        moment = add_outer(moment, error * error / span.spread[k], span.axes[k])
-    for k in range(span.rank, 3):
-        moment = add_outer(moment, (1.0 - cosine * cosine) / (3 - span.rank), span.axes[k])
+    for k in range(3):
+        if k < span.rank:
+            moment = add_outer(moment, error * error / span.spread[k], span.axes[k])
+        else:
+            moment = add_outer(moment, (1.0 - cosine * cosine) / (3 - span.rank), span.axes[k])
     return moment
