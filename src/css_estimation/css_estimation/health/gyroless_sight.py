@@ -15,7 +15,6 @@ from css_common.schema import Parameter, Values
 from css_common.vectors import Vec3
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_ekf
-from css_estimation.sun.other_sun import no_other_sun
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_ekf import EkfParameters, EkfState
@@ -131,7 +130,7 @@ def look(
 def _begun(state: EkfState, sun_b: Vec3, covariance: Symmetric) -> EkfState:
     t = state.tracking
     tracking = TrackingState(sun_b, t.omega_bn_b, t.age, t.validity, t.rate_source, t.field, t.eclipse, t.light)
-    return EkfState(True, covariance, tracking, no_other_sun())
+    return EkfState(True, covariance, tracking)
 
 
 class Led(NamedTuple):

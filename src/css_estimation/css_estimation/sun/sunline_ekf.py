@@ -21,11 +21,8 @@ Darkness. Without light, and with that of a Sun that sets (`fading`), the filter
 nothing is known about the motion: a larger process noise says so, and a state less certain than a fresh one is replaced
 at the next light.
 
-Two Suns. Where the cells that inform it do not span space the filter follows one of two directions, and knows of the
-other one (`other_sun`).
-
-Modes: 0 waiting for light, 1 started in this cycle by the weighted average or from the other Sun, 2 tracking,
-3 propagating with a measured rate, 4 propagating without one.
+Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 tracking, 3 propagating with a
+measured rate, 4 propagating without one.
 """
 
 import math
@@ -35,12 +32,12 @@ from css_common.conversions import square
 from css_common.declared import builder, computed, given, made, part, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, real
+from css_common.vectors import Vec3
 from css_estimation.sun import sun_tracking
-from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout
+from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout, informs, missing_cells, view_margin
 from css_estimation.sun.eclipse_detector import detect_eclipse
 from css_estimation.sun.fading import KNOWN_TURN, LightNow, cells_that_see, light_on, tells_light
-from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output
-from css_estimation.sun.other_sun import Followed, OtherSun, follow_other, no_other_sun, with_other
+from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_algorithm import no_memory
 from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
@@ -53,9 +50,9 @@ from css_estimation.sun.sun_tracking import (
     gyro_usable,
     watch_light,
 )
-from css_estimation.sun.sunline_filter import constrain, propagate, update_cells
+from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
 from css_estimation.sun.wavg import weighted_average
-from css_estimation.symmetric import Symmetric, isotropic, trace
+from css_estimation.symmetric import Symmetric, isotropic, row_major, trace
 
 MODE_WAITING = 0
 MODE_STARTED = 1
@@ -126,7 +123,6 @@ class EkfState(NamedTuple):
     started: bool
     covariance: Symmetric
     tracking: TrackingState
-    other: OtherSun
 
 
 def heading_gain(values: Values) -> float:
@@ -144,7 +140,40 @@ initial_memory = no_memory
 
 def initial_state(p: EkfParameters) -> EkfState:
     """Waiting for light."""
-    return EkfState(False, (p.initial_variance, 0.0, 0.0) * 2, sun_tracking.initial_state(), no_other_sun.py_func())
+    return EkfState(False, (p.initial_variance, 0.0, 0.0) * 2, sun_tracking.initial_state())
+
+
+@kernel
+def update_cells(
+    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, top: int
+) -> tuple[Vec3, Symmetric, float, int, int]:
+    """Updates with every cell that the propagated `sun_b` or the gate selects.
+
+    Args:
+        top: result of `brightest`, which sees the Sun.
+
+    Returns:
+        state (not yet of unit length), covariance, NIS, its degrees of freedom, mask of the cells used.
+    """
+    cells = p.layout.cells
+    level = p.gate.level * voltages[top]
+    _, lit_mask = lit_cells(p.layout, p.gate, voltages, top)
+    predicted_b, predicted_covariance = sun_b, covariance
+    nis = 0.0
+    mask = 0
+    count = 0
+    missing = missing_cells(voltages)
+    for i in range(voltages.shape[0]):
+        v = voltages[i]
+        margin = view_margin(p.layout, i, predicted_covariance)
+        if not informs(p.layout, i, v, level, lit_mask >> i & 1 == 1, predicted_b, margin, missing):
+            continue
+        normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
+        sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, p.cell_variance)
+        nis += q
+        mask |= 1 << i
+        count += 1
+    return sun_b, covariance, nis, count, mask
 
 
 @kernel
@@ -194,26 +223,15 @@ def step(
                 started = restarted = True
     predicted_b = sun_b
     if lit and started:
-        sun_b, covariance, nis, count, mask = update_cells(
-            p.layout, p.gate, p.cell_variance, 1.0, sun_b, covariance, voltages, top
-        )
-    other = state.other
+        sun_b, covariance, nis, count, mask = update_cells(p, sun_b, covariance, voltages, top)
     if started:
         sun_b, covariance = constrain(sun_b, predicted_b, covariance, p.largest_variance)
-        measured_b = aiding.gyro_b if gyro_ok else (0.0, 0.0, 0.0)
-        other_noise = p.process_noise if gyro_ok else p.process_noise_without_rate
-        followed = Followed(p.layout, p.gate, p.cell_variance, 1.0, sun_b, covariance, mask, measured_b, other_noise)
-        other, taken = follow_other(followed, other, dt, voltages, top)
-        if taken:
-            sun_b, covariance, other = other.sun_b, other.covariance, no_other_sun()
-            mode = MODE_STARTED
-            restarted = True
     else:
         mode = MODE_WAITING
 
     estimate = Estimate(
         sun_b,
-        with_other(other, sun_b, covariance, p.largest_variance) if started else NO_COVARIANCE,
+        row_major(covariance) if started else NO_COVARIANCE,
         lit and started,
         False,
         restarted,
@@ -225,4 +243,4 @@ def step(
     )
     shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, aiding.sky.predicted)
     tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)
-    return EkfState(started, covariance, tracking, other), heading
+    return EkfState(started, covariance, tracking), heading
