@@ -19,8 +19,8 @@ def data(sun_b, curve=0, **changed):
     shape = (len(sun_b), len(NORMALS))
     fields = {
         "voltages": np.zeros(shape), "sun_b": sun_b, "intensity": np.ones(len(sun_b)), "seen": np.ones(shape, bool),
-        "usable": np.ones(shape, bool), "albedo": np.zeros(shape), "warmth": np.zeros(len(sun_b)),
-        "time": np.arange(len(sun_b), dtype=float), "turned": np.zeros(len(sun_b)),
+        "usable": np.ones(shape, bool), "at_edge": np.zeros(shape, bool), "albedo": np.zeros(shape),
+        "warmth": np.zeros(len(sun_b)), "time": np.arange(len(sun_b), dtype=float), "turned": np.zeros(len(sun_b)),
     }  # fmt: skip
     return CellData(NORMALS, response=response_of(curve), earth_known=True, **(fields | changed))
 
