@@ -83,7 +83,6 @@ class CellSun:
     Attributes:
         field_variance: least variance of each component of the field [T^2].
         verdicts: (N,) of `css_common.health.VERDICT`.
-        cycles: so far.
     """
 
     def __init__(self, values: Values) -> None:
@@ -94,7 +93,12 @@ class CellSun:
         self._lit_sun, self._chosen = typed_call(lit_sun), typed_call(chosen_sun)
         self._judge = typed_call(trust_cells)
         self._state, self._memory = cell_health.initial_state(), new_memory(len(self._cells))
-        self.verdicts, self.cycles = self._memory.verdicts, 0
+        self.verdicts = self._memory.verdicts
+
+    @property
+    def cycles(self) -> int:
+        """How many have been judged."""
+        return self._state.step
 
     def trusted(self, voltages: np.ndarray, dt: float, at: EnvironmentState) -> np.ndarray:
         """The outputs (N,) of a cycle that can be trusted, NaN for the others.
@@ -109,7 +113,6 @@ class CellSun:
         self._state = self._judge(
             p.judges_cells, p.health, self._state, self._memory, dt, voltages, (0.0, 0.0, 0.0), RATE_NONE, sky
         )
-        self.cycles += 1
         return self._memory.trusted
 
     def seen(self, voltages: np.ndarray, field_b: Vec3, at: EnvironmentState) -> SeenSun | None:

@@ -65,7 +65,6 @@ class AttitudeFilter(Component):
         self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
         self._health = HealthReport() if self.values[ENABLED] else None
-        self._cycles = 0
 
     def tune(self, values: Values) -> None:
         super().tune(values)
@@ -97,8 +96,7 @@ class AttitudeFilter(Component):
         fields = attitude_estimate_fields(solution, self._memory.covariance)
         told: Outgoing = {}
         if self._health is not None:
-            self._cycles += 1
-            told = self._health.told(self, stamp_ns, self._memory.health.verdicts, self._cycles)
+            told = self._health.told(self, stamp_ns, self._memory.health.verdicts, self._state.cells.step)
         return {"attitude": self.message("attitude", stamp_ns, **fields), **told}
 
 

@@ -58,7 +58,6 @@ class Earthlight(Component):
         self._calibrated = CalibratedReadings(self.values)
         self._last_stamp_ns: int | None = None
         self._health = HealthReport() if self.values[ENABLED] else None
-        self._cycles = 0
 
     def tune(self, values: Values) -> None:
         super().tune(values)
@@ -83,8 +82,7 @@ class Earthlight(Component):
         fields = attitude_estimate_fields(solution, self._memory.covariance)
         told: Outgoing = {}
         if self._health is not None:
-            self._cycles += 1
-            told = self._health.told(self, stamp_ns, self._memory.health.verdicts, self._cycles)
+            told = self._health.told(self, stamp_ns, self._memory.health.verdicts, self._state.cells.step)
         return {"attitude": self.message("attitude", stamp_ns, **fields), **told}
 
 
