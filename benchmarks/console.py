@@ -52,7 +52,8 @@ def fly(way: str, duration: float, rate: float, libraries: Mapping[str, Path]) -
             from css_console.stage import Subject  # the server is there only now
             from css_console.thread import ConsoleThread
 
-            thread = stack.enter_context(ConsoleThread(Subject("benchmark", "flight"), libraries, new_token(), 0))
+            thread = stack.enter_context(ConsoleThread(
+                Subject("benchmark", "flight"), libraries, new_token(), 0, inside=flight.output_ports))  # fmt: skip
             if way != SERVED:
                 browser = stack.enter_context(Browser(browser_path() or "", 1400))
                 browser.open(thread.address)

@@ -47,8 +47,8 @@ def _rubbish(mission, stamp_ns: int) -> dict[str, tuple[type, list[bytes]]]:
 
 def _publisher(flight: ComposedFlight, topic: str):
     """The publisher of the node whose topic it is: what others send is not even looked at."""
-    ports = flight.nodes[flight.mission.publishers[topic]]._output_ports.values()
-    return next(publisher for publisher, *_, name in ports if name == topic)
+    ports = flight.nodes[flight.mission.publishers[topic]].output_ports.values()
+    return next(port.publisher for port in ports if port.topic == topic)
 
 
 @pytest.mark.parametrize("rounds", [20])

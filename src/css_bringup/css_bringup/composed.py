@@ -19,6 +19,7 @@ from css_common.link_kinds import PROCESSES_FAIL
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.node_process import create_node
+from css_common.output_port import OutputPort
 from css_common.plant_host import PlantNode
 from css_recording.recorder import RecorderNode
 
@@ -108,6 +109,10 @@ class ComposedFlight:
         node = self.nodes[self._plant_name]
         assert isinstance(node, PlantNode)
         return node
+
+    def output_ports(self) -> dict[str, OutputPort]:
+        """What the nodes publish now, by full name; any thread may ask."""
+        return {port.full_name: port for node in list(self.nodes.values()) for port in list(node.output_ports.values())}
 
     def fly(self, progress: Progress | None = None, stopped: Stopped = lambda: False) -> FlightResult:
         """Flies the mission to its end, or until stopped or interrupted."""

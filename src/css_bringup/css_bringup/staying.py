@@ -28,11 +28,13 @@ class Staying(NamedTuple):
         bag_of: where a flight is recorded; None: nowhere.
         console: where progress is shown, when it is a terminal.
         conclude: says what came of a flight that was not ended for another one, and gives its exit code.
+        begun: is handed each flight before it flies.
     """
 
     bag_of: Callable[[Mission], Path | None]
     console: Console
     conclude: Callable[[Mission, FlightResult], int]
+    begun: Callable[[ComposedFlight], object] = lambda flight: None
 
 
 def mission_of_wish(wish: Wish) -> Mission:
@@ -80,6 +82,7 @@ def _fly_once(
         return directors[0]
 
     with ComposedFlight(mission, staying.bag_of(mission), guests=(direct,)) as flight:
+        staying.begun(flight)
         (director,) = directors
         pace = flight.plant.pace
         if rate is not None:

@@ -6,7 +6,6 @@ component; what only the node that owns simulated time does is in `css_common.pl
 """
 
 import contextlib
-import copy
 import time
 import traceback
 from collections import Counter
@@ -27,7 +26,7 @@ from rclpy.timer import Timer
 
 from css_common import process_faults, ros_parameters
 from css_common.codec import Sample, codec_of
-from css_common.component import Component, Outgoing, Output, Plant, Standing
+from css_common.component import Component, Outgoing, Plant, Standing
 from css_common.component_error import ComponentError
 from css_common.diagnostics import Diagnostics, Health
 from css_common.edge import REJECTED, STRANGER, Edge
@@ -35,8 +34,9 @@ from css_common.fault_services import FaultServices
 from css_common.link_kinds import LINK_FAULTS
 from css_common.matching import Matcher
 from css_common.mission import Event, Mission
+from css_common.output_port import OutputPort
 from css_common.process_faults import ProcessFaults
-from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION
+from css_common.qos import LOOP_SUBSCRIPTION
 from css_common.rcl_errors import endpoint
 from css_common.ros_internals import RCLError
 from css_common.schema import ParameterError, Values
@@ -111,7 +111,7 @@ class ComponentNode(LifecycleNode):
         except BaseException:
             self.destroy_node()  # nobody else will: it is handed to nobody
             raise
-        self._output_ports: dict[str, tuple] = {}
+        self.output_ports: dict[str, OutputPort] = {}
         self.subscriptions_made: list[SoleSubscription] = []
         self.refused = ""
         self._unanswered: tuple[int, dict[str, Sample | None]] | None = None
@@ -223,7 +223,7 @@ class ComponentNode(LifecycleNode):
         self.stepper.tuned = self.matcher.retune
         for output in self.component_type.all_outputs(name, values):
             with endpoint(output.topic):
-                self._output_ports[output.key] = self._create_output(output)
+                self.output_ports[output.key] = OutputPort(self, output, _OVERRIDES)
         for source in inputs:
             edge = Edge(source, values, self.get_logger().warning)
             edge.now_ns = self.component.now_ns
@@ -243,15 +243,6 @@ class ComponentNode(LifecycleNode):
         reason = self._conflict(self.canonical)
         if reason:
             raise ParameterError(reason)
-
-    def _create_output(self, output: Output) -> tuple:
-        publisher = self.create_publisher(
-            output.message_type,
-            output.topic,
-            copy.copy(LOOP_PUBLISHER),  # rclpy writes overrides into the profile that it is given
-            qos_overriding_options=_OVERRIDES,
-        )
-        return publisher, output.topic
 
     def _subscribe(
         self,
@@ -287,12 +278,12 @@ class ComponentNode(LifecycleNode):
 
     def _clean_up(self) -> None:
         self.stop_listening()
-        for publisher, *_ in self._output_ports.values():
-            self.destroy_publisher(publisher)
+        for port in self.output_ports.values():
+            self.destroy_publisher(port.publisher)
         if self._deadline_timer is not None:
             self.destroy_timer(self._deadline_timer)
             self._deadline_timer = None
-        self._output_ports.clear()
+        self.output_ports.clear()
         self.edges.clear()
         if self.component is not None:
             self.component.release()
@@ -321,8 +312,8 @@ class ComponentNode(LifecycleNode):
         """
         limit = time.monotonic() + seconds
         try:
-            for publisher, *_ in self._output_ports.values():
-                publisher.wait_for_all_acked(Duration(seconds=max(0.0, limit - time.monotonic())))
+            for port in self.output_ports.values():
+                port.publisher.wait_for_all_acked(Duration(seconds=max(0.0, limit - time.monotonic())))
         except RCLError:
             if self.context.ok():  # else a signal has ended all traffic already
                 raise
@@ -409,7 +400,7 @@ class ComponentNode(LifecycleNode):
 
     def _publish(self, outgoing: Outgoing) -> None:
         for port, _, data in self.stepper.sent(self._last_stamp, outgoing):
-            self._output_ports[port.key][0].publish(data)
+            self.output_ports[port.key].publish(data)
 
     def _withhold(self, topic: str, field: str) -> None:
         self.counters["withheld_not_finite"] += 1

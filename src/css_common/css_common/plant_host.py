@@ -204,27 +204,27 @@ class PlantNode(ComponentNode):
         """Other writers of what this node alone should write, where its listeners might take one for it."""
         rivals: list[tuple[str, Writer]] = []
         own_name = self.get_fully_qualified_name()
-        for *_, topic in self._output_ports.values():
-            writers = writers_of(self, topic)
+        for port in self.output_ports.values():
+            writers = writers_of(self, port.topic)
             # one whose node is not known yet may be of a second flight, and is waited for
             others = [writer for writer in writers if writer.node not in (own_name, "")]
             if self.mission.values.io.writers == "graph" and len(writers) - len(others) < 2:
                 continue  # no listener mistakes another node for this one
-            rivals += [(topic, writer) for writer in others or writers[1:]]
+            rivals += [(port.topic, writer) for writer in others or writers[1:]]
         return rivals
 
     def _absent_partners(self) -> list[str]:
         absent = []
         recorders = self.component.values.lockstep.recorders
-        for publisher, *_, topic in self._output_ports.values():
+        for port in self.output_ports.values():
             expected = recorders + sum(
-                any(i.topic == topic for i in node.inputs)
+                any(i.topic == port.topic for i in node.inputs)
                 for node in self.mission.nodes
                 if node.component is not self.component_type
             )
-            found = publisher.get_subscription_count()
+            found = port.publisher.get_subscription_count()
             if found < expected:
-                absent.append(f"{topic} has {found} of {expected} listeners")
+                absent.append(f"{port.topic} has {found} of {expected} listeners")
         for topic in self._awaited.values():
             if self.count_publishers(topic) == 0:
                 absent.append(f"{topic} has no publisher")

@@ -8,6 +8,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from css_common.output_port import OutputPort
 from css_console.errors import ConsoleError
 from css_console.server import Server
 from css_console.stage import Stage, Subject
@@ -35,6 +36,7 @@ class ConsoleThread:
         failed: Callable[[], object] = lambda: None,
         *,
         begins: bool = False,
+        inside: Callable[[], Mapping[str, OutputPort]] = dict,
     ) -> None:
         """Prepares.
 
@@ -47,11 +49,13 @@ class ConsoleThread:
             begin_ns: stamp from which seconds count; None: the epoch that the nodes tell.
             failed: called from the thread when it fails after its start.
             begins: let time go on, which is held at the beginning, when the first browser is there.
+            inside: what nodes of this process publish now, by full name.
         """
         self.address = ""
         self.failure: BaseException | None = None
         self._subject, self._libraries, self._token, self._port = subject, libraries, token, port
-        self._fallback, self._begin_ns, self._failed, self._begins = fallback, begin_ns, failed, begins
+        self._fallback, self._begin_ns, self._inside = fallback, begin_ns, inside
+        self._failed, self._begins = failed, begins
         self._serves = threading.Event()
         self._loop: asyncio.AbstractEventLoop | None = None
         self._over: asyncio.Event | None = None
@@ -84,7 +88,7 @@ class ConsoleThread:
 
     async def _serve(self) -> None:
         self._loop, self._over = asyncio.get_running_loop(), asyncio.Event()
-        watcher = Watcher(self._fallback, self._begin_ns)
+        watcher = Watcher(self._fallback, self._begin_ns, self._inside)
         try:
             server = Server(Stage(watcher, self._subject, begins=self._begins), self._libraries, self._token)
             async with server.serving(self._port) as self.address:

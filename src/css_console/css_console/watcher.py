@@ -20,6 +20,7 @@ from css_common.epochs import mission_epoch
 from css_common.executor import create_executor
 from css_common.fault_lines import FAULTS
 from css_common.link_kinds import LINK_FAULTS
+from css_common.output_port import OutputPort
 from css_common.vectors import vector_of
 from css_console.calls import Call, Known, Verdict
 from css_console.frames import Frame, Spacecraft, frame_of
@@ -55,12 +56,18 @@ class Watcher:
         flights: grows when time goes back: another flight, or another place in a recording.
     """
 
-    def __init__(self, fallback: Mapping[str, Any] | None = None, begin_ns: int | None = None) -> None:
+    def __init__(
+        self,
+        fallback: Mapping[str, Any] | None = None,
+        begin_ns: int | None = None,
+        inside: Callable[[], Mapping[str, OutputPort]] = dict,
+    ) -> None:
         """Joins the ROS domain of this process.
 
         Args:
             fallback: parameters of the mission, for a graph whose nodes tell none.
             begin_ns: stamp from which seconds count; None: the epoch that the nodes tell.
+            inside: what nodes of this process publish now, by full name.
         """
         self._context = Context()
         self._context.init()
@@ -71,6 +78,8 @@ class Watcher:
         self._begin_ns = begin_ns
         self._first_ns = self._shown_begin_ns = 0
         self._taps = Taps()
+        self._inside = inside
+        self._ports: Mapping[str, OutputPort] = {}
         self._requests = Requests(self._node)
         self.parameters = Parameters(self._node, self._requests.ask)
         self.inventory = Inventory()
@@ -108,6 +117,8 @@ class Watcher:
         if now - self._looked > (_INVENTORY_EVERY_S if self.frame is not None else _LOOK_EVERY_S):
             self._looked = now
             self._look_around()
+        elif self._inside() != self._ports:
+            self._follow_topics()
         if self._taps.take():
             self._begin_anew()
         stamp_ns = self._taps.common_stamp()
@@ -127,9 +138,13 @@ class Watcher:
                 self.parameters.read_again()
             self.inventory = found
             self.version += 1
-        self._taps.follow(self._node, [(topic, TYPES[kind]) for topic, kind in found.topics])
+        self._follow_topics()
         self.parameters.follow(found.parameters)
         self._follow_states(found.lifecycle)
+
+    def _follow_topics(self) -> None:
+        self._ports = self._inside()
+        self._taps.follow(self._node, [(topic, TYPES[kind]) for topic, kind in self.inventory.topics], self._ports)
 
     def _begin_anew(self) -> None:
         self.flights += 1

@@ -8,7 +8,7 @@ from rclpy.serialization import deserialize_message
 
 from css_common.codec import codec_of
 from css_common.qos import LOOP_PUBLISHER
-from css_console.taps import KEPT, Tap
+from css_console.taps import KEPT, HeardTap
 from css_msgs.msg import ControlStatus
 
 PERIOD_NS = 100_000_000
@@ -21,7 +21,7 @@ class Topic:
         self._publisher = node.create_publisher(ControlStatus, "/control/status", LOOP_PUBLISHER)
         self._codec = codec_of(ControlStatus)
         self.step = 0
-        self.tap = Tap(node, "/control/status", ControlStatus)
+        self.tap = HeardTap(node, "/control/status", ControlStatus)
 
     def publish(self, count: int) -> None:
         for _ in range(count):

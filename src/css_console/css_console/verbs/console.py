@@ -6,10 +6,11 @@ import os
 import signal
 import time
 import webbrowser
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from css_bringup.composed import ComposedFlight
 from css_bringup.flight_director import Wish
 from css_bringup.flight_result import FlightResult, default_bag
 from css_bringup.fly_mission import own_domain
@@ -21,6 +22,7 @@ from css_common.command import FAILED, INTERRUPTED
 from css_common.executor import create_executor
 from css_common.mission import Mission, load_mission, mission_from_text
 from css_common.mission_lookup import known_missions
+from css_common.output_port import OutputPort
 from css_common.stop_signal import StopSignal
 from css_console.errors import ConsoleError
 from css_console.guards import new_token
@@ -68,9 +70,26 @@ def _fly(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
     def end(flown: Mission, result: FlightResult) -> int:
         return conclude(flown, result, as_json=False, with_page=options.record)
 
-    with own_domain(mission.name, options.domain, None, console), _Served(options, libraries, "flight", told) as served:
-        code = fly_and_stay(wish, mission, Staying(bag_of, console, end), rate)
+    inside = _Inside()
+    served = _Served(options, libraries, "flight", told, inside=inside.output_ports)
+    with own_domain(mission.name, options.domain, None, console), served:
+        code = fly_and_stay(wish, mission, Staying(bag_of, console, end, inside.enter), rate)
     return served.code(code)
+
+
+class _Inside:
+    """The flight of this process."""
+
+    def __init__(self) -> None:
+        self._flight: ComposedFlight | None = None
+
+    def enter(self, flight: ComposedFlight) -> None:
+        """The next one."""
+        self._flight = flight
+
+    def output_ports(self) -> Mapping[str, OutputPort]:
+        """What its nodes publish now, by full name."""
+        return {} if self._flight is None else self._flight.output_ports()
 
 
 def _play(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
@@ -122,6 +141,7 @@ class _Served:
         told: Mapping[str, Any],
         fallback: Mapping[str, Any] | None = None,
         begin_ns: int | None = None,
+        inside: Callable[[], Mapping[str, OutputPort]] = dict,
     ) -> None:
         from css_console.stage import Subject  # the server is there now, not before `provide`
         from css_console.thread import ConsoleThread
@@ -131,6 +151,7 @@ class _Served:
         self._thread = ConsoleThread(
             Subject(kind=kind, **told), libraries, new_token(), options.port, fallback, begin_ns,
             failed=lambda: os.kill(os.getpid(), signal.SIGTERM), begins=not (options.paused or options.attach),
+            inside=inside,
         )  # fmt: skip
 
     def __enter__(self) -> "_Served":
