@@ -23,6 +23,7 @@ import llvmlite
 import numba
 from numba.core.types import unliteral
 
+from css_common import boxed_tuples as boxed_tuples  # kernels hand over tuples as it says
 from css_common import places
 from css_common.kernel_sources import hash_of, kernel_modules, sources_of
 from css_common.linked_code import only_linked

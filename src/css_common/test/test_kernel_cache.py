@@ -15,9 +15,9 @@ import pytest
 from presence import present
 
 import css_common.kernel
-import css_common.kernel_sources
 import css_common.linked_code
 import css_common.places
+from css_common import boxed_tuples, kernel_sources
 from css_common.kernel_sources import kernel_modules, sources_of
 
 INNER = "from css_common.kernel import kernel\n@kernel\ndef inner(x):\n    return x + {}\n"
@@ -44,7 +44,7 @@ class Project:
         for package in ("css_common", "css_environment", "css_sim", "css_sim/nodes"):
             (root / package).mkdir()
             (root / package / "__init__.py").touch()
-        for module in (css_common.kernel, css_common.kernel_sources, css_common.linked_code, css_common.places):
+        for module in (boxed_tuples, css_common.kernel, kernel_sources, css_common.linked_code, css_common.places):
             shutil.copy(present(module.__file__), root / "css_common")
         self.write_inner("1.0")
         (root / "css_sim" / "outer.py").write_text(OUTER)
