@@ -196,7 +196,7 @@ class EarthErrors(NamedTuple):
             "albedo.unknown_heading_deg",
             1.5,
             "deg",
-            "error of the heading by an Earth that is not predicted, per axis",
+            "error of the Sun's height over a cell by lasting light of an Earth that is not predicted",
             low=0.0,
             high=45.0,
         ),

@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The heading as the Sun filter reports it, with its error: that of all turns it follows, and of an unknown Earth."""
+"""The heading as the Sun filter reports it, with its error: that of all turns it follows, and of an unknown Earth.
+
+The filter takes the light of an unknown Earth for noise and averages it; it lasts, and what it does to the heading
+remains. An error e common to the outputs of cells with the normals n_i moves the Sun s by what these cells show least,
+
+    e^2 (sum g_i g_i^T + e^2 / theta^2)^-1,    g_i = n_i - (n_i.s) s,
+
+on the plane across the Sun line. A cell that faces the Sun has no slope g there, but a curvature: beyond theta its
+output shows the error all the same, 1 - cos(theta) being the light of the Earth.
+"""
 
 import math
 
@@ -7,8 +16,10 @@ from css_common.kernel import kernel
 from css_common.matrices import skew
 from css_common.vectors import Vec3, add, matmul, multiply, scale, subtract, transpose, unit
 from css_estimation.sun.sun_heading import Covariance
+from css_estimation.sun_filter.cell_model import view_of
 from css_estimation.sun_filter.memory import DEAD, HYPOTHESES, SunFilterMemory, attitude_block, dcm_of
 from css_estimation.sun_filter.options import SunFilterParameters
+from css_estimation.symmetric import add_outer, isotropic
 
 LARGEST = 4.0
 """Reported variance [rad2] of a heading of which nothing is known."""
@@ -26,10 +37,48 @@ def across(sun: Vec3, variance: float) -> Covariance:
 
 
 @kernel
-def heading(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3, earth_known: bool) -> tuple[Vec3, Covariance]:
+def by_unknown_earth(p: SunFilterParameters, sun_b: Vec3, used: int) -> Covariance:
+    """What the lasting light of an Earth that is not predicted does to the heading, row-major.
+
+    Args:
+        used: mask of the cells that the heading rests on; 0 in the dark, when it is those that would see the Sun.
+    """
+    e2 = p.earth.unknown_heading
+    if e2 == 0.0:
+        return across(sun_b, 0.0)
+    slopes = isotropic(0.0)
+    for i in range(p.cells.shape[0]):
+        cosine, seen, _ = view_of(p, i, sun_b, 0.0)
+        if seen and cosine > 0.0 and (used == 0 or used >> i & 1):
+            cell = p.cells[i]
+            slopes = add_outer(slopes, 1.0, subtract((cell.nx, cell.ny, cell.nz), scale(cosine, sun_b)))
+    least = e2 / (2.0 * p.earth.unknown) if p.earth.unknown > 0.0 else 0.0
+    xx, xy, xz, yy, yz, zz = slopes
+    total = xx + yy + zz
+    # of a matrix M on a plane: M^-1 = (trace(M) - M) / det(M)
+    determinant = (
+        0.5 * (total * total - xx * xx - yy * yy - zz * zz) - xy * xy - xz * xz - yz * yz + least * (total + least)
+    )
+    if not determinant > 0.0:
+        return across(sun_b, LARGEST)
+    k, rest = e2 / determinant, across(sun_b, total + least)
+    return (
+        k * (rest[0] - xx), k * (rest[1] - xy), k * (rest[2] - xz),
+        k * (rest[3] - xy), k * (rest[4] - yy), k * (rest[5] - yz),
+        k * (rest[6] - xz), k * (rest[7] - yz), k * (rest[8] - zz),
+    )  # fmt: skip
+
+
+@kernel
+def heading(
+    p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3, earth_known: bool, used: int
+) -> tuple[Vec3, Covariance]:
     """Direction to the Sun in b and its covariance, row-major: of all hypotheses that are followed, by their weights.
 
     Where they disagree about the Sun the disagreement is part of the covariance.
+
+    Args:
+        used: mask of the cells that this cycle rests on.
     """
     total, sun_b = 0.0, (0.0, 0.0, 0.0)
     for k in range(HYPOTHESES):
@@ -56,7 +105,7 @@ def heading(p: SunFilterParameters, m: SunFilterMemory, sun_n: Vec3, earth_known
         yz += weight * (0.5 * (c[1][2] + c[2][1]) + off[1] * off[2])
     # what is beyond a bound is cut as a whole, so that it stays a covariance
     cut = min(1.0, LARGEST / max(xx, yy, zz, LARGEST))
-    systematic = across(sun_b, 0.0 if earth_known else p.earth.unknown_heading)
+    systematic = across(sun_b, 0.0) if earth_known else by_unknown_earth(p, sun_b, used)
     return sun_b, (
         cut * xx + systematic[0], cut * xy + systematic[1], cut * xz + systematic[2],
         cut * xy + systematic[1], cut * yy + systematic[4], cut * yz + systematic[5],

@@ -12,7 +12,7 @@ rate. An estimate that can be no longer trusted (most outputs refused, and anoth
 error larger than a radian; a step longer than `longest_step`) is dropped and the Sun looked for anew.
 
 The covariance is that of the filter, and while the Earth is unknown of its light too, which lasts too long to be noise
-(`albedo.unknown_heading_deg`).
+(`reported`).
 """
 
 import math
@@ -182,7 +182,7 @@ def step(
         rate_source = RATE_GYRO if cycle.model == RATE_BY_GYRO else RATE_NONE
     else:
         progress, rate, reading, mode = track_cycle(p, state, memory, cycle, voltages, aiding)
-        sun_b, covariance = heading_of(p, memory, aiding.sky.sun_n, progress.stage == STAGE_ROLL)
+        sun_b, covariance = heading_of(p, memory, aiding.sky.sun_n, progress.stage == STAGE_ROLL, reading.used)
         a_direction = _finite(sun_b) and dot(sun_b, sun_b) > 0.0 and mean_variance(covariance) > 0.0
         if not (a_direction and _finite(triple(covariance, 0)) and _finite(rate.omega_bn_b)):
             # no hypothesis is left, or beyond what numbers can hold: nothing is known any more

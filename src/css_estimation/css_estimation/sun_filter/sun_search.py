@@ -4,6 +4,9 @@
 They are weighed by what the cells read: one lit cell leaves a ring, several a spot. With a gyro weights gather while
 the body turns, in a frame that turns with it; without, they forget within a second. Mean and spread of them are an
 estimate too, the only one while the spread is large; once it is small the filter begins from it.
+
+What is closer to an output than half of the way to the next direction is as good as equal: of two Suns that explain the
+outputs alike, the one that a direction happens to lie nearer to would win otherwise, were it only looked at for long.
 """
 
 import math
@@ -35,7 +38,7 @@ def cost(p: SunFilterParameters, voltages, flux: float, sun_b: Vec3) -> float:
         cell = p.cells[i]
         v = (voltages[i] - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
         dark = (v - mean_albedo) / _SIGMA
-        lit = (v - mean_albedo - flux * max(cosine, 0.0)) / _SIGMA
+        lit = max(abs(v - mean_albedo - flux * max(cosine, 0.0)) - _MARGIN, 0.0) / _SIGMA
         worst = lit * lit if seen else dark * dark
         if doubtful:
             worst = min(lit * lit, dark * dark)
