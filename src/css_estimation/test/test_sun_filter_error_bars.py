@@ -8,9 +8,10 @@ import pytest
 from cell_layouts import LAYOUTS
 from sun_filter_flight import SunFilterFlight, outputs_of
 
+from css_common.matrices import IDENTITY
 from css_common.vectors import unit
 from css_estimation.sun_filter.reported import LARGEST, by_unknown_earth
-from css_estimation.sun_filter.sun_search import search
+from css_estimation.sun_filter.sun_search import look_of, search
 
 SIX = LAYOUTS["six faces"]
 
@@ -51,7 +52,8 @@ def test_it_is_the_inverse_of_what_cells_in_use_show(layout):
             seen = in_use & (outputs_of(p, sun_b) > 0.0)
             across = np.eye(3) - np.outer(sun_b, sun_b)
             slopes = normals[seen] @ across
-            shown = slopes.T @ slopes + e2 / (2.0 * p.earth.unknown) * across
+            shown = slopes.T @ slopes
+            shown = shown / max(1.0, np.trace(shown) / 2.0) + e2 / (2.0 * p.earth.unknown) * across
             assert error_matrix(p, tuple(sun_b), used) == pytest.approx(e2 * np.linalg.pinv(shown), abs=1e-12)
 
 
@@ -72,10 +74,15 @@ def test_of_two_suns_that_cells_in_a_plane_cannot_tell_neither_wins_by_patience(
         normals = np.column_stack([p.cells["nx"], p.cells["ny"], p.cells["nz"]])
         outputs = np.maximum(normals @ sun_b, 0.0) + 0.5 * p.earth.unknown
         grid[:] = 0.0
-        for _ in range(600):
-            mean, variance = search(
-                p, grid, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), outputs, 1.0, 0.1, True
-            )
+        for k in range(600):
+            share = look_of(0.1, 0.1 * k, 0.0)
+            mean, variance = search(p, grid, IDENTITY, outputs, 1.0, 1.0, share)
         off = math.acos(min(1.0, abs(float(np.dot(mean, sun_b)))))
         assert off < 3.0 * math.sqrt(variance)
         assert abs(mean[2]) < math.sin(height)
+
+
+def test_a_look_is_a_second_or_a_turn():
+    assert sum(look_of(0.1, 0.1 * k, 0.0) for k in range(600)) == pytest.approx(1.0, abs=0.11)
+    assert look_of(0.1, 30.0, 0.014) == pytest.approx(0.01)
+    assert look_of(0.1, 30.0, 1.0) == pytest.approx(0.1)

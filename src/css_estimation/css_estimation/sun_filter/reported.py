@@ -2,12 +2,13 @@
 """The heading as the Sun filter reports it, with its error: that of all turns it follows, and of an unknown Earth.
 
 The filter takes the light of an unknown Earth for noise and averages it; it lasts, and what it does to the heading
-remains. An error e common to the outputs of cells with the normals n_i moves the Sun s by what these cells show least,
+remains. An error e of the outputs of cells with the normals n_i moves the Sun s most to where they show it least,
 
-    e^2 (sum g_i g_i^T + e^2 / theta^2)^-1,    g_i = n_i - (n_i.s) s,
+    e^2 (M + e^2 / theta^2)^-1,    M = k sum g_i g_i^T,    g_i = n_i - (n_i.s) s,
 
-on the plane across the Sun line. A cell that faces the Sun has no slope g there, but a curvature: beyond theta its
-output shows the error all the same, 1 - cos(theta) being the light of the Earth.
+on the plane across the Sun line. The light is alike on cells that look alike, so that many of them average nothing:
+k <= 1 keeps the mean of M on the two axes at 1 at most. A cell that faces the Sun has no slope g, but a curvature:
+beyond theta its output shows the error all the same, 1 - cos(theta) being the light of the Earth.
 """
 
 import math
@@ -19,7 +20,7 @@ from css_estimation.sun.sun_heading import Covariance
 from css_estimation.sun_filter.cell_model import view_of
 from css_estimation.sun_filter.memory import DEAD, HYPOTHESES, SunFilterMemory, attitude_block, dcm_of
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.symmetric import add_outer, isotropic
+from css_estimation.symmetric import add_outer, isotropic, scaled, trace
 
 LARGEST = 4.0
 """Reported variance [rad2] of a heading of which nothing is known."""
@@ -52,9 +53,10 @@ def by_unknown_earth(p: SunFilterParameters, sun_b: Vec3, used: int) -> Covarian
         if seen and cosine > 0.0 and (used == 0 or used >> i & 1):
             cell = p.cells[i]
             slopes = add_outer(slopes, 1.0, subtract((cell.nx, cell.ny, cell.nz), scale(cosine, sun_b)))
+    slopes = scaled(slopes, 1.0 / max(1.0, 0.5 * trace(slopes)))
     least = e2 / (2.0 * p.earth.unknown) if p.earth.unknown > 0.0 else 0.0
     xx, xy, xz, yy, yz, zz = slopes
-    total = xx + yy + zz
+    total = trace(slopes)
     # of a matrix M on a plane: M^-1 = (trace(M) - M) / det(M)
     determinant = (
         0.5 * (total * total - xx * xx - yy * yy - zz * zz) - xy * xy - xz * xz - yz * yz + least * (total + least)

@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """A cycle of the Sun filter without an estimate: the Sun is looked for over the whole sphere."""
 
+import math
+
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.matrices import IDENTITY
-from css_common.vectors import matmul, multiply, scale, unit
+from css_common.vectors import matmul, multiply, norm, scale, unit
 from css_estimation.sun.sun_heading import Aiding
 from css_estimation.sun_filter.filter_state import (
     NO_RATE,
@@ -21,7 +23,7 @@ from css_estimation.sun_filter.hypotheses import begin
 from css_estimation.sun_filter.memory import DIRECTIONS, SunFilterMemory, dcm_of, set_dcm
 from css_estimation.sun_filter.motion import RATE_BY_GYRO
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.sun_filter.sun_search import search
+from css_estimation.sun_filter.sun_search import MEMORY, look_of, search
 
 _SHORTEST_SEARCH = 0.95  # [s]
 
@@ -48,8 +50,11 @@ def search_cycle(
                 memory.grid[g] = 0.0
             begun, since = True, 0.0
         since += cycle.dt
+        # without a gyro the frame does not turn with the body, and what is old has to be forgotten
         turns = cycle.model == RATE_BY_GYRO
-        mean_n, variance = search(p, memory.grid, dcm_of(x), voltages, cycle.flux, cycle.dt, turns)
+        kept = 1.0 if turns else math.exp(-cycle.dt / MEMORY)
+        share = look_of(cycle.dt, since, norm(raw_b)) if turns else 1.0 - kept
+        mean_n, variance = search(p, memory.grid, dcm_of(x), voltages, cycle.flux, kept, share)
         found = Found(multiply(dcm_of(x), mean_n), variance)
         if since > _SHORTEST_SEARCH and variance < p.convergence.search_variance:
             begin(p, memory, found.sun_b, variance, aiding.sky.sun_n, cycle.model, cycle.wheels_b)

@@ -5,8 +5,9 @@ They are weighed by what the cells read: one lit cell leaves a ring, several a s
 the body turns, in a frame that turns with it; without, they forget within a second. Mean and spread of them are an
 estimate too, the only one while the spread is large; once it is small the filter begins from it.
 
-What is closer to an output than half of the way to the next direction is as good as equal: of two Suns that explain the
-outputs alike, the one that a direction happens to lie nearer to would win otherwise, were it only looked at for long.
+With a gyro what the outputs say is counted once for an attitude, and again after a turn: the light of the Earth and
+how far it is to the next direction last, and of two Suns that explain the outputs alike the one that a direction
+happens to lie nearer to would win otherwise, were it only looked at for long.
 """
 
 import math
@@ -19,8 +20,10 @@ from css_estimation.sun_filter.cell_update import READABLE
 from css_estimation.sun_filter.memory import DIRECTIONS
 from css_estimation.sun_filter.options import SunFilterParameters
 
-_MEMORY = 1.0  # [s]
+MEMORY = 1.0
+"""Time [s] over which outputs are averaged: one look."""
 _MARGIN = 0.07  # in cosines, half of the way from one direction to the next
+_TURN = 2.0 * _MARGIN  # [rad] after which a look is another one
 _SIGMA = 0.1  # error of an output that model and Earth leave
 _MOST = 12.0  # cost of a single cell, so that a broken one does not decide
 _LEAST_GAIN = 0.2
@@ -38,7 +41,7 @@ def cost(p: SunFilterParameters, voltages, flux: float, sun_b: Vec3) -> float:
         cell = p.cells[i]
         v = (voltages[i] - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
         dark = (v - mean_albedo) / _SIGMA
-        lit = max(abs(v - mean_albedo - flux * max(cosine, 0.0)) - _MARGIN, 0.0) / _SIGMA
+        lit = (v - mean_albedo - flux * max(cosine, 0.0)) / _SIGMA
         worst = lit * lit if seen else dark * dark
         if doubtful:
             worst = min(lit * lit, dark * dark)
@@ -47,18 +50,29 @@ def cost(p: SunFilterParameters, voltages, flux: float, sun_b: Vec3) -> float:
 
 
 @kernel
+def look_of(dt: float, since: float, rate: float) -> float:
+    """Part of a look that a cycle is where the frame turns with the body: the first second, and then what it turns.
+
+    Args:
+        dt: of the cycle [s].
+        since: the search began [s].
+        rate: of the body [rad/s].
+    """
+    return dt / MEMORY if since <= MEMORY else min(dt / MEMORY, rate * dt / _TURN)
+
+
+@kernel
 def search(
-    p: SunFilterParameters, grid, dcm_bn: Mat3, voltages, flux: float, dt: float, turns: bool
+    p: SunFilterParameters, grid, dcm_bn: Mat3, voltages, flux: float, kept: float, share: float
 ) -> tuple[Vec3, float]:
     """Adds a cycle's outputs to the weights; gives the mean direction in n, and the variance on the worst axis.
 
     Args:
         grid: (DIRECTIONS,) logarithms, advanced.
         dcm_bn: frame in which directions are fixed.
-        turns: it turns with the body, so that nothing need be forgotten.
+        kept: share of the weights that is not forgotten.
+        share: of a look that this cycle is.
     """
-    kept = 1.0 if turns else math.exp(-dt / _MEMORY)
-    share = dt / _MEMORY if turns else 1.0 - kept
     for g in range(DIRECTIONS):
         sun_b = multiply(dcm_bn, direction(g, DIRECTIONS))
         grid[g] = kept * grid[g] - share * cost(p, voltages, flux, sun_b)
