@@ -4,7 +4,7 @@
 The direction that cells are judged by is carried along with the gyro, and one that lies takes it along; so does the
 heading of an estimator. Here the Sun line filter of O'Keefe & Schaub flies without a gyro, as it does where there is
 none, on the cells that can be trusted. It follows one Sun, and takes a dark cell for one at 90 deg from it
-(`sunline_cycle`): what it is sure of and which misfits contradict is set for that filter, not for what `ekf` adds to it.
+(`sunline_cycle`): what it is sure of and which misfits contradict is set for that filter, not for what `ekf` adds.
 """
 
 import math

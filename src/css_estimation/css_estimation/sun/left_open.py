@@ -9,7 +9,7 @@ have two Suns; one cell, or several that look alike, have a ring of them.
 from typing import NamedTuple
 
 from css_common.kernel import kernel
-from css_common.vectors import Mat3, Vec3, add, dot, multiply, norm, scale, subtract
+from css_common.vectors import Mat3, Vec3, add, axes_across, cross, dot, multiply, norm, scale, subtract, unit
 from css_estimation.sun.cell_layout import READABLE, CellLayout, cosine_on, half_view_of
 from css_estimation.symmetric import Symmetric, add_outer, eigen, trace
 from css_sensors.cells import IN_PLANE
@@ -39,12 +39,44 @@ def _outer_sum(cells, mask: int) -> Symmetric:
 
 
 @kernel
+def _span_of_one(n: Vec3) -> Span:
+    return Span(1, (n, *axes_across(n)), (1.0, 0.0, 0.0))
+
+
+@kernel
+def _span_of_two(a: Vec3, b: Vec3) -> Span:
+    """Of unit vectors: n n^T has their sum and their difference for eigenvectors."""
+    if dot(a, b) < 0.0:
+        b = scale(-1.0, b)
+    cosine = min(dot(a, b), 1.0)
+    first, off = unit(add(a, b)), subtract(a, b)
+    second, third = axes_across(first)
+    if norm(off) > _NO_LENGTH:
+        second = unit(off)
+        third = cross(first, second)
+    rank = 2 if 1.0 - cosine >= _OPEN * (1.0 + cosine) else 1
+    return Span(rank, (first, second, third), (1.0 + cosine, 1.0 - cosine, 0.0))
+
+
+@kernel
 def span_of(cells, mask: int) -> Span:
     """Span of the normals of the cells in `mask`.
+
+    One or two cells, which most often leave something open, have it without the search for eigenvectors.
 
     Args:
         cells: (N,) with the fields nx, ny, nz.
     """
+    count = 0
+    last = before = (0.0, 0.0, 0.0)
+    for i in range(cells.shape[0]):
+        if mask >> i & 1:
+            last, before = (cells[i].nx, cells[i].ny, cells[i].nz), last
+            count += 1
+    if count == 1:
+        return _span_of_one(last)
+    if count == 2:
+        return _span_of_two(before, last)
     spread, axes = eigen(_outer_sum(cells, mask))
     rank = 0
     for k in range(3):

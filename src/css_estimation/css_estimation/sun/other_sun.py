@@ -29,6 +29,7 @@ _NEWS = 1.0
 _MOST = 5.0**2
 _LARGEST_VARIANCE = 4.0
 _NO_DIRECTION = 1e-6
+_IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class OtherSun(NamedTuple):
@@ -69,11 +70,29 @@ def _covers(sun_b: Vec3, covariance: Symmetric, other_b: Vec3) -> bool:
 
 
 @kernel
-def _image(f: Followed, span: Span) -> tuple[bool, Vec3, Mat3]:
-    """Whether there is a mirror image of the estimate that its covariance covers, where, and the mirror."""
-    x, y, z = mirrored(span, (1.0, 0.0, 0.0)), mirrored(span, (0.0, 1.0, 0.0)), mirrored(span, (0.0, 0.0, 1.0))
+def _covered_image(f: Followed, span: Span) -> tuple[bool, Vec3]:
+    """Whether there is a mirror image of the estimate that its covariance covers, and where."""
     image_b = mirrored(span, f.sun_b)
-    return span.rank < 3 and _covers(f.sun_b, f.covariance, image_b), image_b, (x, y, z)
+    return span.rank < 3 and _covers(f.sun_b, f.covariance, image_b), image_b
+
+
+@kernel
+def _image(f: Followed, lit_mask: int) -> tuple[bool, bool, Vec3, Mat3]:
+    """Whether lit cells leave open on which side the Sun is; whether its image is covered, where, and the mirror."""
+    cells = f.layout.cells
+    leaves, found, image_b = False, False, f.sun_b
+    span = Span(3, _IDENTITY, f.sun_b)
+    if lit_mask != 0 and not surely_spans_space(cells, lit_mask):
+        span = span_of(cells, lit_mask)
+        leaves = span.rank < 3
+        found, image_b = _covered_image(f, span)
+        # a single lit cell leaves a ring, of which dark ones leave two parts
+        if leaves and not found and f.informing != lit_mask and not surely_spans_space(cells, f.informing):
+            span = span_of(cells, f.informing)
+            found, image_b = _covered_image(f, span)
+    x, y, z = _IDENTITY
+    mirror = (mirrored(span, x), mirrored(span, y), mirrored(span, z)) if found else _IDENTITY
+    return leaves, found, image_b, mirror
 
 
 @kernel
@@ -99,32 +118,24 @@ def follow_other(f: Followed, other: OtherSun, dt: float, voltages, top: int) ->
         top: result of `brightest`.
     """
     lit = f.informing != 0
-    alive, _, sun_b, covariance, odds = other
-    if alive:
-        sun_b, covariance = propagate(sun_b, covariance, f.rate_b, dt, f.process_noise)
-        predicted_b = sun_b
-        if lit:
-            sun_b, covariance, _, _, _ = update_cells(
-                f.layout, f.gate, f.cell_variance, True, sun_b, covariance, voltages, top
-            )
-        sun_b, covariance = constrain(sun_b, predicted_b, covariance, _LARGEST_VARIANCE)
-    covered = alive and _covers(f.sun_b, f.covariance, sun_b)
     # cells that it has in view and are dark say on which side of their edge the Sun is, not where
     lit_mask = f.informing & lit_cells(f.layout, f.gate, voltages, top)[1] if lit else 0
-    if lit_mask != 0 and not surely_spans_space(f.layout.cells, lit_mask):
-        span = span_of(f.layout.cells, lit_mask)
-        if span.rank < 3:
-            found, image_b, mirror = _image(f, span)
-            if not found:
-                # a single lit cell leaves a ring, of which dark ones leave two parts
-                found, image_b, mirror = _image(f, span_of(f.layout.cells, f.informing))
-            if found:
-                # as long as the estimate covers it, it is the image of each cycle
-                return OtherSun(True, False, image_b, congruence(mirror, f.covariance), 0.0), False
-            if covered:
-                return OtherSun(True, False, sun_b, covariance, 0.0), False
-    if not alive or covered:
+    leaves, found, image_b, mirror = _image(f, lit_mask)
+    if found:
+        # as long as the estimate covers it, it is the image of each cycle
+        return OtherSun(True, False, image_b, congruence(mirror, f.covariance), 0.0), False
+    if not other.alive:
         return no_other_sun(), False
+    sun_b, covariance = propagate(other.sun_b, other.covariance, f.rate_b, dt, f.process_noise)
+    predicted_b = sun_b
+    if lit:
+        sun_b, covariance, _, _, _ = update_cells(
+            f.layout, f.gate, f.cell_variance, True, sun_b, covariance, voltages, top
+        )
+    sun_b, covariance = constrain(sun_b, predicted_b, covariance, _LARGEST_VARIANCE)
+    if _covers(f.sun_b, f.covariance, sun_b):
+        return (OtherSun(True, False, sun_b, covariance, 0.0) if leaves else no_other_sun()), False
+    odds = other.odds
     if lit:
         difference = _misfit(f, voltages, top, sun_b) - _misfit(f, voltages, top, f.sun_b)
         odds += 0.5 * min(1.0, dt / _NEWS) * difference
