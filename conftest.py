@@ -79,6 +79,7 @@ _LONG = (
     "src/css_monte_carlo/test/test_monte_carlo_flies_as_the_components.py::test_torque_rods_alone_are_the_same[cubesat_3u_sun_filter",
     "src/css_papers/test/test_best_page.py::test_a_short_flight_gives_a_page",
     "src/css_papers/test/test_okeefe_page.py::test_a_few_real_flights",
+    "src/css_papers/test/test_wrong_in_silence.py::test_everywhere_on_every_layout",
     "tests/bootstrap/test_preparation.py::test_interruption_stops_everything_that_was_started[15",
     "tests/test_attached_console.py",
     "tests/test_calibration_of_flights.py",

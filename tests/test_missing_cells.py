@@ -32,6 +32,19 @@ def errors_deg(result: ReplayResult, name: str) -> np.ndarray:
     return np.degrees(errors)
 
 
+def variances(result: ReplayResult, name: str) -> np.ndarray:
+    """Sum [rad^2] of the variances that an estimator claims; negative: it claims nothing."""
+    covariance = result.log.estimates[name].covariance
+    return np.where(covariance[:, 0] < 0.0, -1.0, covariance[:, [0, 4, 8]].sum(axis=1))
+
+
+def of_a_plane(errors_deg: np.ndarray, cell_sigma: float = 0.1) -> np.ndarray:
+    """The same of two faces that show the Sun's projection on their plane without error, but on neither side of it."""
+    cosine = np.cos(np.radians(errors_deg))
+    across = 1.0 - (cosine - cell_sigma) ** 2 + (cell_sigma / cosine) ** 2
+    return across + 0.5 * np.minimum(across**2, across)
+
+
 def now_and_then(text: str) -> Callable[[int, str, float], str]:
     """The bright cell of the first half of the lines is missing in four lines of ten."""
 
@@ -59,10 +72,14 @@ def test_a_cell_that_is_missing_now_and_then_costs_neither_line_nor_accuracy(tmp
     errors = errors_deg(result, "wls_gate_0")
     spans = result.log.estimates["wls_gate_0"].mode == 3
     assert errors[spans].max() < 0.1
-    # where two cells are left, their plane: least squares gives no covariance and so does not claim to know
+    # where two cells are left, their plane: least squares says how far off it the Sun is
     missing = np.array([k % 10 in (4, 5, 6, 7) and k < 60 for k in range(LINES)])
     assert np.array_equal(~spans, missing | (np.arange(LINES) % 90 == 0))
-    assert np.all(result.log.estimates["wls_gate_0"].covariance[~spans, 0] == -1.0)
+    claimed = variances(result, "wls_gate_0")
+    plane = result.log.estimates["wls_gate_0"].mode == 2
+    np.testing.assert_allclose(claimed[plane], of_a_plane(errors[plane]), rtol=1e-6)
+    # outputs that fade together are a Sun that sets: the heading is held
+    assert np.count_nonzero(plane) == 18 and np.all(claimed[~spans & ~plane] == -1.0)
     assert result.rejected == {}
     assert result.missing == {"/css/voltages": {f"voltages.{kind}": 24}}
     (report,) = result.reports
@@ -74,17 +91,17 @@ def test_a_cell_that_is_always_missing_leaves_open_what_it_alone_sees(tmp_path):
     result = replayed(bag, "ekf", "wls:gate=0", "wls:gate=0,use_dark_cells=true")
     errors = errors_deg(result, "ekf")
     _, nees = tangent_nees(result.log, "ekf")
-    sigma_deg = np.degrees(np.sqrt(result.log.estimates["ekf"].covariance[:, [0, 4, 8]].sum(axis=1)))
+    sigma_deg = np.degrees(np.sqrt(variances(result, "ekf")))
     # the Sun is on +x first: that face alone would tell, and the filter says so
     assert errors[0] > 50.0 and np.all(sigma_deg[:4] > 60.0)
     assert nees.max() < 2.0
     # the gyro turns what the others see into what is missing, a cell that the Sun only grazes among them
     assert errors[10:].max() < 0.1
     for name in ("wls_gate_0", "wls_gate_0_use_dark_cells_true"):
-        estimates = result.log.estimates[name]
-        known = estimates.covariance[:, 0] >= 0.0
+        known = result.log.estimates[name].mode == 3
         assert errors_deg(result, name)[known].max() < 0.1
         assert np.count_nonzero(known) == 29, "those behind the missing face, where three other cells are lit"
+        assert np.all(np.sin(np.radians(errors_deg(result, name))) ** 2 <= variances(result, name))
 
 
 def test_every_estimator_takes_a_missing_cell_and_gives_finite_numbers(tmp_path):

@@ -11,6 +11,7 @@ from okeefe_spacecraft import okeefe_values
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.vectors import multiply, scale
 from css_estimation.sun import fading
+from css_estimation.sun.cell_layout import cell_layout
 from css_estimation.sun.fading import KNOWN_TURN, LightNow, follow_light, in_the_dark, initial_track
 from css_estimation.sun.sun_estimator import SunEstimator
 from css_estimation.sun.sun_heading import (
@@ -152,7 +153,7 @@ def test_another_light_that_lasts_is_another_intensity():
 
 
 def test_light_on_the_cells_is_that_of_the_cell_that_faded_least():
-    layout = Estimator(KINDS[0]).p.layout
+    layout = cell_layout(okeefe_values(KINDS[0].table()))
     sun_b = np.array([0.2, 0.0, math.sqrt(0.96)])
     voltages = 0.9 * outputs_of(sun_b)
     voltages[1] = math.nan

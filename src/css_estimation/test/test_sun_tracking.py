@@ -9,7 +9,7 @@ from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.vectors import angle_between, cross, multiply, norm, scale, subtract
-from css_estimation.sun import sunline_ekf, wavg
+from css_estimation.sun import sunline_cycle, sunline_ekf, wavg
 from css_estimation.sun.sun_heading import (
     RATE_GYRO,
     RATE_NONE,
@@ -78,10 +78,10 @@ def test_a_filter_that_starts_anew_makes_no_rate_of_its_old_and_its_new_vector()
     for other in (continued, anew):
         other.state, other.sun_b = flight.state, flight.sun_b
     heading = continued.step(gyro=False, dt=100.0, omega=(1e-7, 0.0, 0.0))
-    assert (heading.mode, heading.rate_source) == (sunline_ekf.MODE_TRACKING, RATE_SUN)
+    assert (heading.mode, heading.rate_source) == (sunline_cycle.MODE_TRACKING, RATE_SUN)
     heading = anew.step(gyro=False, dt=5e4, omega=(1e-7, 0.0, 0.0))
-    assert (heading.mode, heading.rate_source) == (sunline_ekf.MODE_STARTED, RATE_NONE)
-    assert heading.omega_bn_b == flight.state.tracking.omega_bn_b
+    assert (heading.mode, heading.rate_source) == (sunline_cycle.MODE_STARTED, RATE_NONE)
+    assert heading.omega_bn_b == flight.state.sunline.tracking.omega_bn_b
     assert anew.step(gyro=False).rate_source == RATE_SUN
 
 
@@ -181,11 +181,11 @@ def test_eclipse_is_reported_after_ten_seconds_of_darkness(estimator):
 
 def test_ekf_modes_tell_what_it_lives_on():
     flight = Flight(sunline_ekf)
-    assert flight.step(lit=False).mode == sunline_ekf.MODE_WAITING
-    assert flight.step().mode == sunline_ekf.MODE_STARTED
-    assert flight.step().mode == sunline_ekf.MODE_TRACKING
-    assert flight.step(lit=False).mode == sunline_ekf.MODE_PROPAGATING
-    assert flight.fly(2, lit=False, gyro=False)[-1].mode == sunline_ekf.MODE_COASTING
+    assert flight.step(lit=False).mode == sunline_cycle.MODE_WAITING
+    assert flight.step().mode == sunline_cycle.MODE_STARTED
+    assert flight.step().mode == sunline_cycle.MODE_TRACKING
+    assert flight.step(lit=False).mode == sunline_cycle.MODE_PROPAGATING
+    assert flight.fly(2, lit=False, gyro=False)[-1].mode == sunline_cycle.MODE_COASTING
 
 
 def test_ekf_covariance_grows_in_darkness_to_its_bound():
@@ -194,7 +194,7 @@ def test_ekf_covariance_grows_in_darkness_to_its_bound():
     trace = [h.covariance[0] + h.covariance[4] + h.covariance[8] for h in flight.fly(9000, lit=False, gyro=False)]
     assert np.all(np.diff(trace[:2000]) > 0.0)
     assert max(trace) <= 3.0 * 4.0 + 1e-9
-    assert flight.step(gyro=False).mode == sunline_ekf.MODE_STARTED
+    assert flight.step(gyro=False).mode == sunline_cycle.MODE_STARTED
 
 
 def test_ekf_keeps_its_state_through_an_eclipse_with_gyro():
@@ -202,4 +202,4 @@ def test_ekf_keeps_its_state_through_an_eclipse_with_gyro():
     flight.fly(300)
     dark = flight.fly(21600, lit=False)[-1]  # 36 min
     assert angle_between(dark.sun_b, flight.sun_b) < math.radians(0.5)
-    assert flight.step().mode == sunline_ekf.MODE_TRACKING
+    assert flight.step().mode == sunline_cycle.MODE_TRACKING

@@ -17,7 +17,8 @@ from scipy.stats import chi2
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.vectors import angle_between, multiply, scale, vector_of
 from css_estimation.sun import sunline_ekf
-from css_estimation.sun.sun_heading import UNAIDED
+from css_estimation.sun.sun_heading import UNAIDED, VALIDITY_VALID
+from css_estimation.symmetric import isotropic
 from css_sensors.cells import CELLS
 
 RUNS = 60
@@ -31,6 +32,13 @@ NORMALS = np.asarray(okeefe_values(CELLS).cells.normals)
 def ekf(**changes):
     p = sunline_ekf.parameters(okeefe_values(CELLS + sunline_ekf.PARAMETERS, **changes))
     return p, sunline_ekf.initial_state(p)
+
+
+def begun(state, sun_b, variance, **changes):
+    """The state of a filter that has started, at `sun_b` and with so much variance on each axis."""
+    line = state.sunline
+    tracking = line.tracking._replace(sun_b=sun_b, **changes)
+    return state._replace(sunline=line._replace(started=True, covariance=isotropic(variance), tracking=tracking))
 
 
 def with_gyro(omega):
@@ -53,11 +61,7 @@ def fly_ideal(seed):
     drawn = rng.normal(size=3)
     sun_b = vector_of(drawn / np.linalg.norm(drawn))
     start_b = turned(sun_b, tuple(0.05 * rng.normal(size=3)), 1.0)
-    state = state._replace(
-        started=True,
-        covariance=(0.05**2, 0.0, 0.0, 0.05**2, 0.0, 0.05**2),
-        tracking=state.tracking._replace(sun_b=start_b),
-    )
+    state = begun(state, start_b, 0.05**2)
     nees, nis, dof = np.empty(STEPS), np.empty(STEPS), np.empty(STEPS)
     for k in range(STEPS):
         omega = rate_at(k * DT)
@@ -171,11 +175,7 @@ def test_finds_the_sun_from_a_wrong_start(seed):
     omega = tuple((math.radians(2.0) * axis / np.linalg.norm(axis)).tolist())
     p, state = ekf()
     wrong_b = tuple(-c for c in sun_b)
-    state = state._replace(
-        started=True,
-        covariance=(0.01, 0.0, 0.0, 0.01, 0.0, 0.01),
-        tracking=state.tracking._replace(sun_b=wrong_b, validity=2),
-    )
+    state = begun(state, wrong_b, 0.01, validity=VALIDITY_VALID)
     for _ in range(900):
         sun_b = turned(sun_b, omega)
         state, heading = sunline_ekf.step(p, state, None, DT, cell_outputs(sun_b), with_gyro(omega))

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from css_common.vectors import mat3
 from css_estimation.sun import sunline_ekf
-from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
+from css_estimation.sun.sunline_filter import constrain, propagate, update_cell, update_cells
 from css_estimation.symmetric import congruence, product, row_major
 from css_sensors.cells import CELLS
 
@@ -50,7 +50,7 @@ def random_direction(rng):
 def stacked_update(s, p, normals, outputs, variance):
     """Eqs. 11-13 with all cells at once, and the NIS of the stacked innovation."""
     h = np.asarray(normals)
-    r = variance * np.eye(len(h))
+    r = np.diag(np.broadcast_to(variance, len(h)))
     innovation = np.asarray(outputs) - h @ s
     innovation_covariance = h @ p @ h.T + r
     k = p @ h.T @ np.linalg.inv(innovation_covariance)
@@ -147,18 +147,23 @@ def test_symmetric_helpers(rng):
     np.testing.assert_allclose(product(upper(p), (1.0, 2.0, 3.0)), p @ (1.0, 2.0, 3.0), rtol=1e-13)
 
 
-def test_cells_used_are_the_predicted_and_the_bright_ones():
-    p = sunline_ekf.parameters(okeefe_values(CELLS + sunline_ekf.PARAMETERS))
+@pytest.mark.parametrize("beyond_edge", [False, True])
+def test_cells_used_are_the_predicted_and_the_bright_ones(beyond_edge):
+    p = sunline_ekf.parameters(okeefe_values(CELLS + sunline_ekf.PARAMETERS)).sunline
     predicted_b = (0.0, 0.0, 1.0)  # all four cells of the +z side
     voltages = np.array([0.7, 0.7, 0.7, 0.0, 0.1, 0.5, 0.27, 0.29])
     prior = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
-    s, cov, nis, count, mask = sunline_ekf.update_cells(p, predicted_b, prior, voltages, 0)
+    s, cov, nis, count, mask = update_cells(
+        p.layout, p.gate, p.cell_variance, beyond_edge, predicted_b, prior, voltages, 0
+    )
     # cell 3 is predicted lit and dark, cell 5 is above 0.4 of the brightest, 7 is above it by 0.01
     assert mask == 0b10101111
     assert count == 6
     used = [i for i in range(8) if mask >> i & 1]
     normals = [[p.layout.cells[i][c] for c in ("nx", "ny", "nz")] for i in used]
-    expected = stacked_update(np.array(predicted_b), dense(prior), normals, voltages[used], p.cell_variance)
+    # of a dark cell the Sun's cosine is below that at the edge of its view, 0.5, or zero
+    variances = p.cell_variance + np.where((np.array(used) == 3) & beyond_edge, 0.5**2 / 3.0, 0.0)
+    expected = stacked_update(np.array(predicted_b), dense(prior), normals, voltages[used], variances)
     np.testing.assert_allclose(s, expected[0], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(dense(cov), expected[1], rtol=1e-8, atol=1e-14)
     assert nis == pytest.approx(expected[2], rel=1e-9)

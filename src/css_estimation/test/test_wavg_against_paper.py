@@ -13,7 +13,7 @@ from ideal_cells import AZIMUTH, POLAR, WEIGHT, direction, ideal_outputs, percen
 from okeefe_spacecraft import okeefe_values
 
 from css_common.kernel import kernel
-from css_common.vectors import angle_between
+from css_common.vectors import angle_between, unit
 from css_estimation.sun import wavg
 from css_estimation.sun.cell_layout import brightest, cell_layout
 from css_estimation.sun.snapshot import MODE_NO_SUN
@@ -236,7 +236,37 @@ def test_the_measure_knows_the_view_and_no_more_than_the_sun():
     assert sum(one_cell(0.0, scale=1.3)[0].covariance[::4]) == facing
 
 
-def test_an_average_of_several_cells_has_no_measure():
-    p = wavg.parameters(okeefe_values(CELLS + wavg.PARAMETERS))
-    _, heading = wavg.step(p, wavg.initial_state(p), None, 0.1, np.array([0.7, 0.6, 0, 0, 0, 0, 0, 0.0]), UNAIDED)
-    assert heading.covariance[0] == -1.0
+def test_an_average_of_two_cells_knows_that_the_sun_may_be_on_either_side_of_their_plane():
+    """Second moment about the average of the two Suns that give these outputs, the cells' own error aside."""
+    p = wavg.parameters(okeefe_values(CELLS + wavg.PARAMETERS, cell_sigma=1e-6))
+    normals = np.array([[p.snapshot.layout.cells[i][c] for c in ("nx", "ny", "nz")] for i in (0, 1)])
+    across = np.cross(*normals) / np.linalg.norm(np.cross(*normals))
+    for off_deg in (0.0, 10.0, 25.0):
+        inside = 0.6 * normals[0] + 0.5 * normals[1]
+        inside /= np.linalg.norm(inside)
+        suns = [
+            math.cos(math.radians(off_deg)) * inside + side * math.sin(math.radians(off_deg)) * across
+            for side in (-1.0, 1.0)
+        ]
+        voltages = np.zeros(8)
+        voltages[:2] = normals @ suns[0]
+        np.testing.assert_allclose(voltages[:2], normals @ suns[1], atol=1e-12)
+        _, heading = wavg.step(p, wavg.initial_state(p), None, 0.1, voltages, UNAIDED)
+        n = np.array(heading.sun_b)
+        tangent = np.eye(3) - np.outer(n, n)
+        expected = np.mean([np.outer(tangent @ (s - n), tangent @ (s - n)) for s in suns], axis=0)
+        found = tangent @ np.reshape(heading.covariance, (3, 3)) @ tangent
+        np.testing.assert_allclose(found, expected, atol=1e-5)
+
+
+def test_an_average_of_cells_that_span_space_knows_its_bias():
+    p = wavg.parameters(okeefe_values(CELLS + wavg.PARAMETERS, cell_sigma=1e-6))
+    normals = np.array([[p.snapshot.layout.cells[i][c] for c in ("nx", "ny", "nz")] for i in range(8)])
+    sun_b = np.array(unit((0.1, 0.15, 1.0)))
+    voltages = np.where(normals[:, 2] > 0.0, normals @ sun_b, 0.0)
+    _, heading = wavg.step(p, wavg.initial_state(p), None, 0.1, voltages, UNAIDED)
+    off = sun_b - heading.sun_b
+    assert np.degrees(np.linalg.norm(off)) > 4.0
+    variances, axes = np.linalg.eigh(np.reshape(heading.covariance, (3, 3)))
+    assert variances[-1] == pytest.approx(off @ off, rel=0.01)
+    assert abs(axes[:, -1] @ off) > 0.99 * np.linalg.norm(off)

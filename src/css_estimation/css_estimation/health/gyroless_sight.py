@@ -3,7 +3,8 @@
 
 The direction that cells are judged by is carried along with the gyro, and one that lies takes it along; so does the
 heading of an estimator. Here the Sun line filter of O'Keefe & Schaub flies without a gyro, as it does where there is
-none, on the cells that can be trusted.
+none, on the cells that can be trusted. It follows one Sun, and takes a dark cell for one at 90 deg from it
+(`sunline_cycle`): what it is sure of and which misfits contradict is set for that filter, not for what `ekf` adds.
 """
 
 import math
@@ -14,10 +15,10 @@ from css_common.kernel import kernel
 from css_common.schema import Parameter, Values
 from css_common.vectors import Vec3
 from css_estimation.health.sight import Sight
-from css_estimation.sun import sunline_ekf
+from css_estimation.sun import sunline_cycle
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky
 from css_estimation.sun.sun_tracking import TrackingState
-from css_estimation.sun.sunline_ekf import EkfParameters, EkfState
+from css_estimation.sun.sunline_cycle import SunlineParameters, SunlineState, step_alone
 from css_estimation.symmetric import Symmetric, add_outer, isotropic, trace
 
 _SURE = 0.01  # [rad^2] along the better axis: 6 deg
@@ -59,27 +60,27 @@ def _converted(parameter: Parameter[Any]) -> Any:
     return parameter.check(parameter.default)
 
 
-def gyroless_parameters(values: Values) -> EkfParameters:
+def gyroless_parameters(values: Values) -> SunlineParameters:
     """Of the filter without a gyro, for the cells of a mission."""
-    return built(EkfParameters, _Instead(values, use_gyro=False, **_GYROLESS))  # type: ignore[arg-type]
+    return built(SunlineParameters, _Instead(values, use_gyro=False, **_GYROLESS))  # type: ignore[arg-type]
 
 
-def gyro_led_parameters(values: Values) -> EkfParameters:
+def gyro_led_parameters(values: Values) -> SunlineParameters:
     """Of the filter that believes the gyro, for the cells of a mission."""
-    return built(EkfParameters, _Instead(values, use_gyro=True, **_GYRO_LED))  # type: ignore[arg-type]
+    return built(SunlineParameters, _Instead(values, use_gyro=True, **_GYRO_LED))  # type: ignore[arg-type]
 
 
 class Gyroless(NamedTuple):
     """The filter without a gyro."""
 
-    filter: EkfState
+    filter: SunlineState
     found: bool  # it has begun where all cells together show the Sun
     waited: float  # [s] that it has seen light, until then
 
 
-def initial_state(p: EkfParameters) -> Gyroless:
+def initial_state(p: SunlineParameters) -> Gyroless:
     """Waiting for light."""
-    return Gyroless(sunline_ekf.initial_state(p), False, 0.0)
+    return Gyroless(sunline_cycle.initial_state(p), False, 0.0)
 
 
 class Glimpse(NamedTuple):
@@ -101,7 +102,7 @@ def glimpse_of(sight: Sight) -> Glimpse:
 
 @kernel
 def look(
-    p: EkfParameters, state: Gyroless, dt: float, voltages, speeds, sky: Sky, found: bool, found_b: Vec3
+    p: SunlineParameters, state: Gyroless, dt: float, voltages, speeds, sky: Sky, found: bool, found_b: Vec3
 ) -> tuple[Gyroless, Glimpse]:
     """State and sight after one cycle.
 
@@ -119,7 +120,7 @@ def look(
     if found and not state.found:
         before = _begun(before, found_b, isotropic(_FOUND))
     unaided = Aiding(_NO_RATE, False, _NO_RATE, False, speeds, False, sky)
-    after, heading = sunline_ekf.step(p, before, None, dt, voltages, unaided)
+    after, heading = step_alone(p, before, dt, voltages, unaided)
     lit = heading.validity == VALIDITY_VALID and after.started
     waited = state.waited + dt if lit else state.waited
     known = lit and (found or state.found or waited > _PATIENCE) and least_across(after.covariance) < _SURE
@@ -127,24 +128,24 @@ def look(
 
 
 @kernel
-def _begun(state: EkfState, sun_b: Vec3, covariance: Symmetric) -> EkfState:
+def _begun(state: SunlineState, sun_b: Vec3, covariance: Symmetric) -> SunlineState:
     t = state.tracking
     tracking = TrackingState(sun_b, t.omega_bn_b, t.age, t.validity, t.rate_source, t.field, t.eclipse, t.light)
-    return EkfState(True, covariance, tracking)
+    return SunlineState(True, covariance, tracking)
 
 
 class Led(NamedTuple):
     """A Sun line filter that believes the gyro, begun where the cells alone saw the Sun."""
 
-    filter: EkfState
+    filter: SunlineState
     misfit: float  # [-] normalised innovation squared per cell, averaged
     since: float  # [s] since it was begun; negative: until it is, while the Sun is in sight
     strikes: int  # how often it has ended in misfits; it begins with 1 once it has long fitted
 
 
-def initial_led(p: EkfParameters) -> Led:
+def initial_led(p: SunlineParameters) -> Led:
     """Waiting for a sight."""
-    return Led(sunline_ekf.initial_state(p), 0.0, -_SETTLING, 0)
+    return Led(sunline_cycle.initial_state(p), 0.0, -_SETTLING, 0)
 
 
 @kernel
@@ -167,7 +168,7 @@ def _begin(led: Led, glimpse: Glimpse, strikes: int) -> Led:
 
 @kernel
 def follow_gyro(
-    p: EkfParameters,
+    p: SunlineParameters,
     led: Led,
     dt: float,
     voltages,
@@ -191,7 +192,7 @@ def follow_gyro(
         since = led.since + dt if glimpse.known else -_SETTLING
         return _begin(led, glimpse, led.strikes) if since >= 0.0 else Led(led.filter, 0.0, since, led.strikes)
     aided = Aiding(gyro_b, True, _NO_RATE, False, speeds, False, sky)
-    state, heading = sunline_ekf.step(p, led.filter, None, dt, voltages, aided)
+    state, heading = step_alone(p, led.filter, dt, voltages, aided)
     misfit, since = led.misfit, led.since + dt
     if heading.nis_dof > 0:
         misfit += min(dt / _MEMORY, 1.0) * (heading.nis / heading.nis_dof - misfit)

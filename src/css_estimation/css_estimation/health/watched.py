@@ -33,7 +33,7 @@ from css_estimation.health.gyroless_sight import Glimpse, Gyroless, Led, contrad
 from css_estimation.sun import heading_dispatch
 from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
-from css_estimation.sun.sunline_ekf import EkfParameters
+from css_estimation.sun.sunline_cycle import SunlineParameters
 
 PARAMETERS = (ENABLED, *cell_options.PARAMETERS, *aiding_health.PARAMETERS)
 NO_VERDICTS = new_verdicts(SORT_CELL, 0)
@@ -51,8 +51,8 @@ class AidingWatch(NamedTuple):
 class Watched(NamedTuple):
     """Parameters."""
 
-    sight: EkfParameters
-    led: EkfParameters
+    sight: SunlineParameters
+    led: SunlineParameters
     aiding: AidingHealthParameters
     cells: CellHealthParameters
     use_gyro: bool

@@ -6,7 +6,8 @@ common to all cells. Three or more cells that span space give x by least squares
 dim cells err more by the light of the Earth (Basilisk's cssWlsEst), or evenly. Fewer cells, or normals in a plane
 or nearly so, leave part of x unknown: the pseudo-inverse, whose weak directions the condition test drops, gives
 the solution of least norm, x = N^T (N N^T)^-1 V for independent normals. That is the Sun projected on the span of
-the normals, and the heading errs by the Sun's angle from it.
+the normals, and the heading errs by the Sun's angle from it, on either side. The covariance says by how much, as far
+as the light on the cells is that of the Sun (`left_open`).
 
 Dark cells know about the unknown part (`use_dark_cells`): the Sun is where just the lit cells see it
 (`sun_patterns`). Of that part of the sphere with mean m and covariance C, one lit cell leaves the mean. Lit cells
@@ -31,6 +32,7 @@ from css_common.schema import Values, choice, flag, real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, subtract
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import brightest, cell_layout, missing_cells
+from css_estimation.sun.left_open import Span, second_moment, span_of, spread_along
 from css_estimation.sun.lit_cells import CELL_SIGMA, Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_algorithm import no_memory
@@ -147,7 +149,9 @@ def least_squares(p: LeastSquaresParameters, voltages, top: int) -> Snapshot:
     if not lit:
         return none
     if mask == 0:
-        return Snapshot((cells[top].nx, cells[top].ny, cells[top].nz), NO_COVARIANCE, 1 << top, MODE_BELOW_GATE)
+        normal_b, alone = (cells[top].nx, cells[top].ny, cells[top].nz), 1 << top
+        moment = _left_open(p, span_of(cells, alone), scale(voltages[top], normal_b), alone, normal_b)
+        return Snapshot(normal_b, moment, alone, MODE_BELOW_GATE)
     equations = normal_equations(cells, p.weighted, voltages, mask, top)
     values, vectors = eigen(equations.matrix)
     x = (0.0, 0.0, 0.0)
@@ -174,7 +178,14 @@ def least_squares(p: LeastSquaresParameters, voltages, top: int) -> Snapshot:
             sun_b = scale(1.0 / norm(mean), mean)
             mode = MODE_LINE_AND_DARK if rank == 1 else MODE_PLANE_AND_DARK
             return Snapshot(sun_b, _covariance(sun_b, spread), mask, mode)
-    return Snapshot(sun_b, NO_COVARIANCE, mask, rank)
+    span = Span(rank, vectors, spread_along(cells, mask, vectors))
+    return Snapshot(sun_b, _left_open(p, span, scale(voltages[top], x), mask, sun_b), mask, rank)
+
+
+@kernel
+def _left_open(p: LeastSquaresParameters, span: Span, projected: Vec3, mask: int, sun_b: Vec3) -> Covariance:
+    """Covariance of a heading of least norm."""
+    return _covariance(sun_b, second_moment(p.snapshot.layout, span, projected, mask, p.cell_sigma, sun_b))
 
 
 @kernel

@@ -1,116 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Extended Kalman filter on the Sun direction (O'Keefe & Schaub 2013, Eqs. 3-14).
+"""Extended Kalman filter on the Sun direction (O'Keefe & Schaub 2013, Eqs. 3-14), and the other Sun beside it.
 
-State: the unit vector sun_b; continuous propagation with the body rate, one scalar update a cell in Joseph
-form.
+The filter itself, what it does with dim and missing cells and in darkness, and its modes stand in `sunline_cycle`.
 
-Which cells enter decides whether the filter works. Used are the cells that the propagated estimate puts in
-the Sun's view, whatever they read (a dark one says where the Sun is not), and those brighter than a gate
-relative to the brightest. A cell below the gate may be lit by the Earth alone; where its field of view lets it read so
-little of the Sun (`lit_cells`), it is used if the Sun may be in its view within the error of the prediction.
+Two Suns. Where the cells that inform it do not span space the filter follows one of two directions, and knows of the
+other one (`other_sun`). If that turns out to be the right one the filter goes on from there: mode 1, as at its start.
 
-Missing cells (NaN). A dark cell by itself says that the Sun is not in front of it; that it is just beside takes a cell
-that looks the other way and is dark too. Where that one is missing, the dark one is left out.
-
-Norm. The paper says nothing about the length of the state. Here it is set to one after each cycle, and the
-covariance is told so: tangent variance stays, variance along the Sun line becomes what tangent errors leave
-there, e^2/2, whose second moment is trace^2/2. Far from convergence the filter so stays the linear one that
-finds the Sun from anywhere; once converged it is consistent on the two axes that exist.
-
-Darkness. Without light, and with that of a Sun that sets (`fading`), the filter only propagates. Without gyro too,
-nothing is known about the motion: a larger process noise says so, and a state less certain than a fresh one is replaced
-at the next light.
-
-Modes: 0 waiting for light, 1 started by the weighted average in this cycle, 2 tracking, 3 propagating with a
-measured rate, 4 propagating without one.
+Dark cells. One with a narrow view says that the Sun is beyond its edge, not that it is 90 deg away.
 """
 
 import math
 from typing import NamedTuple
 
-from css_common.conversions import square
-from css_common.declared import builder, computed, given, made, part, table_of
+from css_common.declared import builder, part, table_of
 from css_common.kernel import kernel
-from css_common.schema import Values, choice, real
-from css_common.vectors import Vec3
-from css_estimation.sun import sun_tracking
-from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout, informs, missing_cells, view_margin
-from css_estimation.sun.eclipse_detector import detect_eclipse
-from css_estimation.sun.fading import KNOWN_TURN, LightNow, cells_that_see, light_on, tells_light
-from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output, lit_cells
-from css_estimation.sun.snapshot import MODE_NO_SUN
+from css_common.schema import Values
+from css_estimation.sun import sunline_cycle
+from css_estimation.sun.lit_cells import CELL_SIGMA
+from css_estimation.sun.other_sun import Followed, OtherSun, follow_other, no_other_sun, with_other
 from css_estimation.sun.sun_algorithm import no_memory
-from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
-from css_estimation.sun.sun_tracking import (
-    Estimate,
-    TrackingParameters,
-    TrackingState,
-    elapsed,
-    finish_cycle,
-    gyro_usable,
-    watch_light,
-)
-from css_estimation.sun.sunline_filter import constrain, propagate, update_cell
-from css_estimation.sun.wavg import weighted_average
-from css_estimation.symmetric import Symmetric, isotropic, row_major, trace
-
-MODE_WAITING = 0
-MODE_STARTED = 1
-MODE_TRACKING = 2
-MODE_PROPAGATING = 3
-MODE_COASTING = 4
-
-
-_GATE = real(
-    "gate",
-    0.4,
-    "-",
-    "share of the brightest cell above which a cell is used",
-    low=0.0,
-    high=1.0,
-    tunable=True,
-)
-_MINIMUM = real("minimum_output", 0.3, "-", "no update unless a cell is above it", low=0.0, high=1.0, tunable=True)
-
-_PROCESS_SIGMA = real(
-    "process_sigma", 0.01, "rad/sqrt(s)", "drift of the Sun line, 1 sigma", low=0.0, high=10.0, tunable=True
+from css_estimation.sun.sun_heading import Aiding, SunHeading
+from css_estimation.sun.sun_tracking import Estimate, elapsed
+from css_estimation.sun.sunline_cycle import (
+    MODE_STARTED,
+    PROCESS_SIGMA,
+    Outcome,
+    SunlineParameters,
+    SunlineState,
+    close_cycle,
+    filter_cycle,
 )
 
 
 class EkfParameters(NamedTuple):
-    """Variances in rad^2, process noise in rad^2/s."""
+    """Parameters."""
 
-    layout: CellLayout = computed(cell_layout)
-    gate: Gate = computed(
-        lambda values: Gate(True, values[_GATE], values[_MINIMUM], dimmest_output(values)), _GATE, _MINIMUM, DIM_CELLS
-    )
-    cell_variance: float = made(square, CELL_SIGMA)
-    process_noise: float = made(square, _PROCESS_SIGMA)
-    process_noise_without_rate: float = made(
-        square,
-        real(
-            "process_sigma_without_rate",
-            0.1,
-            "rad/sqrt(s)",
-            "the same while no rate is measured, 1 sigma",
-            low=0.0,
-            high=10.0,
-            tunable=True,
-        ),
-    )
-    initial_variance: float = made(
-        square, real("initial_sigma", 1.0, "rad", "error of the start, 1 sigma", low=0.0, open_low=True, high=2.0)
-    )
-    largest_variance: float = given(
-        real("largest_variance", 4.0, "rad^2", "cap on the diagonal of the covariance", low=0.01, high=100.0)
-    )
-    propagate_filtered: bool = made(
-        lambda word: word == "filtered",
-        choice(
-            "propagate_with", "measured", ("measured", "filtered"), "gyro rate as measured, or as low-pass filtered"
-        ),
-    )
-    tracking: TrackingParameters = part(TrackingParameters)
+    sunline: SunlineParameters = part(SunlineParameters)
 
 
 PARAMETERS = table_of(EkfParameters)
@@ -118,11 +43,10 @@ parameters = builder(EkfParameters)
 
 
 class EkfState(NamedTuple):
-    """Carried from cycle to cycle; sun_b is in `tracking`."""
+    """Carried from cycle to cycle."""
 
-    started: bool
-    covariance: Symmetric
-    tracking: TrackingState
+    sunline: SunlineState
+    other: OtherSun
 
 
 def heading_gain(values: Values) -> float:
@@ -130,7 +54,7 @@ def heading_gain(values: Values) -> float:
 
     P = P - P^2 / (P + R) + Q h, solved for the covariance P before an update.
     """
-    q, r = values[_PROCESS_SIGMA] ** 2 * values.mission.period, values[CELL_SIGMA] ** 2
+    q, r = values[PROCESS_SIGMA] ** 2 * values.mission.period, values[CELL_SIGMA] ** 2
     before = 0.5 * (q + math.sqrt(q * q + 4.0 * q * r))
     return before / (before + r)
 
@@ -140,40 +64,30 @@ initial_memory = no_memory
 
 def initial_state(p: EkfParameters) -> EkfState:
     """Waiting for light."""
-    return EkfState(False, (p.initial_variance, 0.0, 0.0) * 2, sun_tracking.initial_state())
+    return EkfState(sunline_cycle.initial_state(p.sunline), no_other_sun.py_func())
 
 
 @kernel
-def update_cells(
-    p: EkfParameters, sun_b: Vec3, covariance: Symmetric, voltages, top: int
-) -> tuple[Vec3, Symmetric, float, int, int]:
-    """Updates with every cell that the propagated `sun_b` or the gate selects.
+def _beside_other(
+    p: SunlineParameters, outcome: Outcome, other: OtherSun, dt: float, voltages, aiding: Aiding
+) -> tuple[Outcome, OtherSun]:
+    """What a cycle comes to beside the other Sun, and that one after it.
 
-    Args:
-        top: result of `brightest`, which sees the Sun.
-
-    Returns:
-        state (not yet of unit length), covariance, NIS, its degrees of freedom, mask of the cells used.
+    Either the other Sun is part of the error that is reported, or the filter goes on from there.
     """
-    cells = p.layout.cells
-    level = p.gate.level * voltages[top]
-    _, lit_mask = lit_cells(p.layout, p.gate, voltages, top)
-    predicted_b, predicted_covariance = sun_b, covariance
-    nis = 0.0
-    mask = 0
-    count = 0
-    missing = missing_cells(voltages)
-    for i in range(voltages.shape[0]):
-        v = voltages[i]
-        margin = view_margin(p.layout, i, predicted_covariance)
-        if not informs(p.layout, i, v, level, lit_mask >> i & 1 == 1, predicted_b, margin, missing):
-            continue
-        normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
-        sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, p.cell_variance)
-        nis += q
-        mask |= 1 << i
-        count += 1
-    return sun_b, covariance, nis, count, mask
+    e = outcome.estimate
+    sun_b, covariance, mode, restarted = e.sun_b, outcome.covariance, e.mode, e.restarted
+    rate_b = aiding.gyro_b if outcome.gyro_ok else (0.0, 0.0, 0.0)
+    noise = p.process_noise if outcome.gyro_ok else p.process_noise_without_rate
+    followed = Followed(p.layout, p.gate, p.cell_variance, sun_b, covariance, e.lit_mask, rate_b, noise)
+    other, taken = follow_other(followed, other, dt, voltages, outcome.top)
+    if taken:
+        sun_b, covariance, other = other.sun_b, other.covariance, no_other_sun()
+        mode = MODE_STARTED
+        restarted = True
+    reported = with_other(other, sun_b, covariance, p.largest_variance)
+    estimate = Estimate(sun_b, reported, e.valid, e.stands_in, restarted, e.nis, e.nis_dof, e.lit_mask, mode, e.light)
+    return Outcome(True, covariance, outcome.top, outcome.largest, outcome.gyro_ok, estimate), other
 
 
 @kernel
@@ -187,60 +101,9 @@ def step(
 ) -> tuple[EkfState, SunHeading]:
     """One cycle; arguments in `css_estimation.sun.sun_algorithm`."""
     dt = elapsed(dt)
-    gyro_ok = gyro_usable(p.tracking, aiding)
-    top = brightest(voltages)
-    largest = voltages[top] if top >= 0 else 0.0
-    lit = largest > p.gate.minimum_output
-
-    tracking = state.tracking
-    started = state.started
-    sun_b = tracking.sun_b
-    covariance = state.covariance
-    rate_known = gyro_ok or tracking.rate_source != RATE_NONE
-    if started:
-        rate = aiding.gyro_b if gyro_ok and not p.propagate_filtered else tracking.omega_bn_b
-        noise = p.process_noise if rate_known else p.process_noise_without_rate
-        sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
-
-    sure = started and tells_light(tracking.light, trace(covariance))
-    light = light_on(p.layout, sun_b, voltages, cells_that_see(p.layout, sun_b)) if sure else 0.0
-    track, setting = watch_light(p.tracking, tracking, dt, aiding, lit, LightNow(light, KNOWN_TURN))
-    lit = lit and not setting
-
-    mode = MODE_PROPAGATING if rate_known else MODE_COASTING
-    restarted = False
-    nis = 0.0
-    count = 0
-    mask = 0
-    if lit:
-        mode = MODE_TRACKING
-        if not started or trace(covariance) > 3.0 * p.initial_variance:
-            average_b, _, average_mode = weighted_average(p.layout, p.gate, voltages, top)
-            if average_mode != MODE_NO_SUN:
-                sun_b = average_b
-                covariance = isotropic(p.initial_variance)
-                mode = MODE_STARTED
-                started = restarted = True
-    predicted_b = sun_b
-    if lit and started:
-        sun_b, covariance, nis, count, mask = update_cells(p, sun_b, covariance, voltages, top)
-    if started:
-        sun_b, covariance = constrain(sun_b, predicted_b, covariance, p.largest_variance)
-    else:
-        mode = MODE_WAITING
-
-    estimate = Estimate(
-        sun_b,
-        row_major(covariance) if started else NO_COVARIANCE,
-        lit and started,
-        False,
-        restarted,
-        nis,
-        count,
-        mask,
-        mode,
-        track,
-    )
-    shadow = detect_eclipse(p.tracking.eclipse, tracking.eclipse, dt, largest, aiding.sky.predicted)
-    tracking, heading = finish_cycle(p.tracking, tracking, dt, aiding, gyro_ok, shadow, estimate)
-    return EkfState(started, covariance, tracking), heading
+    other = state.other
+    outcome = filter_cycle(p.sunline, state.sunline, dt, voltages, aiding, True)
+    if outcome.started:
+        outcome, other = _beside_other(p.sunline, outcome, other, dt, voltages, aiding)
+    sunline, heading = close_cycle(p.sunline, state.sunline, dt, aiding, outcome)
+    return EkfState(sunline, other), heading

@@ -8,6 +8,8 @@ sequence equal the stacked one of the paper, without a matrix inverse.
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot, multiply, norm, scale
+from css_estimation.sun.cell_layout import CellLayout, half_view_of, informs, missing_cells, view_margin
+from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, subtract_pair, trace
 
 _NO_DIRECTION = 1e-6
@@ -43,6 +45,54 @@ def update_cell(
     innovation = output - dot(normal_b, sun_b)
     sun_b = (sun_b[0] + k[0] * innovation, sun_b[1] + k[1] * innovation, sun_b[2] + k[2] * innovation)
     return sun_b, subtract_pair(p, k, h), innovation * innovation * inverse
+
+
+@kernel
+def update_cells(
+    layout: CellLayout,
+    gate: Gate,
+    cell_variance: float,
+    beyond_edge: bool,
+    sun_b: Vec3,
+    covariance: Symmetric,
+    voltages,
+    top: int,
+) -> tuple[Vec3, Symmetric, float, int, int]:
+    """Updates with every cell that the propagated `sun_b` or the gate selects.
+
+    Args:
+        beyond_edge: of a dark one the Sun's cosine is below that at the edge of its view, or as far below zero: with a
+            narrow view that is a variance beside that of the cell. Else it is zero, as for the paper's filter.
+        top: result of `brightest`, which sees the Sun.
+
+    Returns:
+        state (not yet of unit length), covariance, NIS, its degrees of freedom, mask of the cells used.
+    """
+    cells = layout.cells
+    level = gate.level * voltages[top]
+    _, lit_mask = lit_cells(layout, gate, voltages, top)
+    predicted_b, predicted_covariance = sun_b, covariance
+    nis = 0.0
+    mask = 0
+    count = 0
+    missing = missing_cells(voltages)
+    for i in range(voltages.shape[0]):
+        v = voltages[i]
+        margin = view_margin(layout, i, predicted_covariance)
+        if not informs(layout, i, v, level, lit_mask >> i & 1 == 1, predicted_b, margin, missing):
+            continue
+        variance = cell_variance
+        if beyond_edge:
+            edge = half_view_of(layout, i)
+            # nearer to dark than to the least that it reads of a Sun in its view
+            if v < 0.5 * edge and lit_mask >> i & 1 == 0:
+                variance += edge * edge / 3.0
+        normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
+        sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, variance)
+        nis += q
+        mask |= 1 << i
+        count += 1
+    return sun_b, covariance, nis, count, mask
 
 
 @kernel

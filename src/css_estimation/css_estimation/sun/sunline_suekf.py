@@ -15,6 +15,10 @@ A step turns d about the rate, which is constant in b; the frame turns with d, a
 Cells that enter are the lit ones, and the ones in whose view the prediction puts the Sun, whatever they read, with
 V_i = light max(0, n_i.d). Of missing cells the same holds as in `sunline_ekf`.
 
+Where the lit cells do not span space, light and direction make up for one another, and which of two Suns it is nobody
+knows; large errors of both soon pass for small ones. What these cells leave open (`left_open`) is then reported beside
+the filter's own covariance.
+
 Modes as in `unscented_cycle`.
 """
 
@@ -28,6 +32,7 @@ from css_common.schema import real
 from css_common.vectors import Vec3, add, cross, dot, norm, scale, unit
 from css_estimation.sun import unscented_cycle
 from css_estimation.sun.cell_layout import informs, missing_cells, view_margin
+from css_estimation.sun.left_open import projection, second_moment, span_of, surely_spans_space
 from css_estimation.sun.lit_cells import scale_of
 from css_estimation.sun.square_root import add_vector
 from css_estimation.sun.sun_heading import Aiding, SunHeading
@@ -56,6 +61,7 @@ from css_estimation.sun.unscented_cycle import (
     sure_rate,
     turn_points,
 )
+from css_estimation.symmetric import Symmetric
 
 _RATES = 2
 _LIGHT = 5
@@ -207,6 +213,20 @@ def begin(p: SunlineSuekfParameters, cycle: Cycle, voltages, memory: UnscentedMe
 
 
 @kernel
+def unseen(p: UnscentedParameters, cycle: Cycle, voltages, memory: UnscentedMemory) -> Symmetric:
+    """What the lit cells of a cycle leave open of the direction; nothing where they span space, and in the dark."""
+    cells = p.layout.cells
+    if not cycle.lit or surely_spans_space(cells, cycle.lit_mask):
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    span = span_of(cells, cycle.lit_mask)
+    if span.rank == 3:
+        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    projected = projection(p.layout, span, voltages, cycle.lit_mask)
+    sigma = math.sqrt(p.cell_variance)
+    return second_moment(p.layout, span, projected, cycle.lit_mask, sigma, unit(direction_of(memory)))
+
+
+@kernel
 def step(
     p: SunlineSuekfParameters,
     state: UnscentedState,
@@ -237,4 +257,6 @@ def step(
     if started:
         axis = switch_axis(axis, memory)
         rate = _across(memory.x[3], memory.x[4], rate_axes(direction_of(memory), axis))
-    return close_cycle(f, state, cycle, aiding, Outcome(started, restarted, axis, rate, nis, count, mask), memory)
+    left_open = unseen(f, cycle, voltages, memory) if started else (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    outcome = Outcome(started, restarted, axis, rate, nis, count, mask, left_open)
+    return close_cycle(f, state, cycle, aiding, outcome, memory)

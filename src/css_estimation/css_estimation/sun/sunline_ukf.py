@@ -144,4 +144,5 @@ def step(
                 nis, count = 0.0, 0
                 started = restarted = begin(f, cycle, voltages, memory)
     rate = _rate(memory) if started else (0.0, 0.0, 0.0)
-    return close_cycle(f, state, cycle, aiding, Outcome(started, restarted, 0, rate, nis, count, mask), memory)
+    outcome = Outcome(started, restarted, 0, rate, nis, count, mask, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return close_cycle(f, state, cycle, aiding, outcome, memory)

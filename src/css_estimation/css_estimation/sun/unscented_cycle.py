@@ -130,6 +130,7 @@ class Outcome(NamedTuple):
     nis: float
     cells: int  # that contributed
     mask: int  # which
+    left_open: Symmetric  # variance of the direction beside that of the states
 
 
 def initial_state(p: object) -> UnscentedState:
@@ -266,11 +267,14 @@ def _mode(cycle: Cycle, outcome: Outcome, validity: int) -> int:
 
 
 @kernel
-def _reported(p: UnscentedParameters, sun: Vec3, length: float, memory: UnscentedMemory) -> Covariance:
+def _reported(
+    p: UnscentedParameters, sun: Vec3, length: float, left_open: Symmetric, memory: UnscentedMemory
+) -> Covariance:
     """Covariance of the direction: that of the Sun vector over its length, on the plane across it."""
-    c = direction_covariance(memory)
+    c, o = direction_covariance(memory), left_open
     k = 1.0 / (length * length)
-    _, across = constrain(sun, sun, (k * c[0], k * c[1], k * c[2], k * c[3], k * c[4], k * c[5]), p.largest_variance)
+    both = (k * c[0] + o[0], k * c[1] + o[1], k * c[2] + o[2], k * c[3] + o[3], k * c[4] + o[4], k * c[5] + o[5])
+    _, across = constrain(sun, sun, both, p.largest_variance)
     return row_major(across)
 
 
@@ -289,7 +293,7 @@ def close_cycle(
     if outcome.started:
         vector = direction_of(memory)
         sun = unit(vector)
-        covariance = _reported(p, sun, dot(sun, vector), memory)
+        covariance = _reported(p, sun, dot(sun, vector), outcome.left_open, memory)
     else:
         sun = _held(tracking, cycle, aiding)
     limit = p.tracking.rate_limit

@@ -5,8 +5,9 @@ The sum runs over the cells that see the Sun, and the gate of `lit_cells` decide
 relative, a scale common to all cells has no effect: the method's main virtue.
 
 Where one cell alone sees the Sun its output is the cosine of the heading's error, the measure that the paper speaks
-of: the Sun is that far from the normal, on any side. The covariance says so, with the cell's own error to the bad side;
-of an average of several cells there is none.
+of: the Sun is that far from the normal, on any side. The covariance says so, with the cell's own error to the bad side.
+Several cells tell more (`left_open`): those in a plane how far the Sun is from that plane, on either side, and those
+that span space where it is, from which the average then errs by its bias.
 
 Modes: 0 no Sun, 1 average of several cells, 2 a single cell (the error can reach its half view), 3
 brightest cell below an absolute gate.
@@ -19,6 +20,7 @@ from css_common.kernel import kernel
 from css_common.vectors import Vec3, norm, scale
 from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest, half_view_of
+from css_estimation.sun.left_open import projection, second_moment, span_of
 from css_estimation.sun.lit_cells import CELL_SIGMA, Gate, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN, Snapshot, SnapshotParameters, finish_snapshot
 from css_estimation.sun.sun_algorithm import no_memory
@@ -96,6 +98,15 @@ def single_cell_covariance(layout: CellLayout, i: int, output: float, cell_sigma
 
 
 @kernel
+def average_covariance(layout: CellLayout, voltages, mask: int, cell_sigma: float, sun_b: Vec3) -> Covariance:
+    """Covariance of the average of several cells: what their outputs leave of the Sun's direction, about it."""
+    span = span_of(layout.cells, mask)
+    projected = projection(layout, span, voltages, mask)
+    moment = second_moment(layout, span, projected, mask, cell_sigma, sun_b)
+    return row_major(constrain(sun_b, sun_b, moment, _LARGEST_VARIANCE)[1])
+
+
+@kernel
 def step(
     p: WavgParameters,
     state: TrackingState,
@@ -110,5 +121,7 @@ def step(
     covariance = NO_COVARIANCE
     if mode in (MODE_SINGLE_CELL, MODE_BELOW_GATE):
         covariance = single_cell_covariance(p.snapshot.layout, top, voltages[top], p.cell_sigma)
+    elif mode == MODE_AVERAGE:
+        covariance = average_covariance(p.snapshot.layout, voltages, lit_mask, p.cell_sigma, sun_b)
     seen = Snapshot(sun_b, covariance, lit_mask, mode)
     return finish_snapshot(p.snapshot, state, dt, voltages, top, aiding, seen)
