@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""No estimator is valid and wrong beyond its error bar: on any layout, with the Sun anywhere, turning or not.
+"""Where an estimator may be valid and wrong beyond its error bar: on any layout, the Sun anywhere, turning or not.
 
 One lit cell leaves a ring of directions, lit cells in a plane two: which side it is nobody can know before another cell
 or the motion tells. Outputs are exact, so that nothing else can make an error of more than a few degrees.
@@ -32,12 +32,19 @@ FEW = ("dual pyramid", "single pyramid", "four coplanar")
 # Of 80 directions, those from which an estimator is still wrong in silence in some cycle. Without gyro one or two lit
 # cells do not show how the body turns, and `ekf` takes the rate of successive estimates for one; a third cell that
 # comes into view meets a filter that is too sure (`ekf`), or that has made up for the direction by the
-# light (`sunline_suekf`).
+# light (`sunline_suekf`). `sun_filter` begins between the two Suns of two lit cells and falls for one of them.
 OPEN = {
     ("ekf", "dual pyramid", "turning"): 3,
     ("ekf", "dual pyramid", "turning, no gyro"): 6,
     ("ekf", "single pyramid", "turning"): 1,
     ("ekf", "single pyramid", "turning, no gyro"): 4,
+    ("sun_filter", "dual pyramid", "at rest"): 8,
+    ("sun_filter", "dual pyramid", "turning"): 10,
+    ("sun_filter", "dual pyramid", "turning, no gyro"): 14,
+    ("sun_filter", "single pyramid", "at rest"): 4,
+    ("sun_filter", "single pyramid", "turning"): 3,
+    ("sun_filter", "single pyramid", "turning, no gyro"): 6,
+    ("sun_filter", "four coplanar", "turning"): 3,
     ("sunline_suekf", "dual pyramid", "at rest"): 2,
     ("sunline_suekf", "dual pyramid", "turning"): 4,
     ("sunline_suekf", "dual pyramid", "turning, no gyro"): 4,
