@@ -56,6 +56,9 @@ def _accuse_biased(p: GyroHealthParameters, verdicts, bias: Bias, kind: int, evi
     worst = _worst_axis(p, bias)
     for i in range(3):
         statistic = axis_significance(bias, i, p.usual_bias)
+        if i == worst:
+            # no axis alone, but all together are beyond the threshold: then that is what decided
+            statistic = max(statistic, significance(bias, p.usual_bias))
         if i == worst or statistic > p.threshold:
             _accuse(verdicts[i], kind, evidence, statistic, p.threshold, step)
 
@@ -66,7 +69,10 @@ def _review_biased(p: GyroHealthParameters, verdicts, bias: Bias, evidence: int,
     worst = _worst_axis(p, bias)
     for i in range(3):
         statistic = axis_significance(bias, i, p.usual_bias)
-        if verdicts[i].held == 0 and (i == worst or statistic > p.threshold):
+        if verdicts[i].held == 0 and i == worst and statistic <= p.threshold:
+            # all axes together are beyond what a gyro that is right again shows
+            hold(verdicts[i], KIND_BIAS, evidence, significance(bias, p.usual_bias), p.agreement, step)
+        elif verdicts[i].held == 0 and statistic > p.threshold:
             hold(verdicts[i], KIND_BIAS, evidence, statistic, p.threshold, step)
         elif verdicts[i].held != 0 and i != worst and statistic < p.agreement:
             release(verdicts[i])

@@ -14,8 +14,11 @@ from css_common.declared import built
 from css_common.kernel import kernel
 from css_common.schema import Parameter, Values
 from css_common.vectors import Vec3
+from css_estimation.health.cell_expectation import DOUBTFUL, HIDDEN, SEEN, SURE, expected
+from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_cycle
+from css_estimation.sun.cell_layout import READABLE, cosine_on
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_cycle import SunlineParameters, SunlineState, step_alone
@@ -25,8 +28,9 @@ _SURE = 0.01  # [rad^2] along the better axis: 6 deg
 # Where one or two cells see the Sun, the direction that they do not tell has to get uncertain as fast as a body turns
 # that nothing is known of.
 _GYROLESS = {"process_sigma": 0.03}
-# A filter that follows the gyro through ten seconds before cells move it, and thinks well of cells.
-_GYRO_LED = {"process_sigma": 0.0015, "cell_sigma": 0.05}
+# A filter that follows the gyro through ten seconds before cells move it, and thinks well of cells: of those that it
+# expects the Sun on. One that is bright beside a grazed one is lit by the Earth as likely.
+_GYRO_LED = {"process_sigma": 0.0015, "cell_sigma": 0.05, "gate": 1.0}
 _MEMORY = 5.0  # [s] of which misfits are averaged
 _SETTLING = 5.0  # [s] in which a Sun that was found may still move
 _LONG = 10.0  # [s] after which a filter has shown that it fits, or not
@@ -138,7 +142,7 @@ class Led(NamedTuple):
     """A Sun line filter that believes the gyro, begun where the cells alone saw the Sun."""
 
     filter: SunlineState
-    misfit: float  # [-] normalised innovation squared per cell, averaged
+    misfit: float  # [-] squared sigmas per cell, averaged
     since: float  # [s] since it was begun; negative: until it is, while the Sun is in sight
     strikes: int  # how often it has ended in misfits; it begins with 1 once it has long fitted
 
@@ -167,8 +171,33 @@ def _begin(led: Led, glimpse: Glimpse, strikes: int) -> Led:
 
 
 @kernel
+def _misfit(p: SunlineParameters, cells: CellHealthParameters, state: SunlineState, voltages) -> tuple[float, int]:
+    """Sum of the squared sigmas by which outputs are off, and of how many cells.
+
+    Those of cells on the edge of whose view the Sun may be are left out: a heading that is right within its error puts
+    it inside where it is outside, and the output is off by half of the Sun whatever the gyro says. So is light on a
+    hidden cell that the Earth may throw.
+    """
+    total, count = 0.0, 0
+    sun_b = state.tracking.sun_b
+    for i in range(voltages.shape[0]):
+        v = voltages[i]
+        # a NaN compares false
+        if not abs(v) < READABLE:
+            continue
+        seen = expected(cells, i, sun_b, state.covariance, 1.0, SURE).sight
+        if seen == DOUBTFUL or (seen == HIDDEN and v < cells.earth):
+            continue
+        off = v - (cosine_on(p.layout, i, sun_b) if seen == SEEN else 0.0)
+        total += off * off / p.cell_variance
+        count += 1
+    return total, count
+
+
+@kernel
 def follow_gyro(
     p: SunlineParameters,
+    cells: CellHealthParameters,
     led: Led,
     dt: float,
     voltages,
@@ -194,8 +223,11 @@ def follow_gyro(
     aided = Aiding(gyro_b, True, _NO_RATE, False, speeds, False, sky)
     state, heading = step_alone(p, led.filter, dt, voltages, aided)
     misfit, since = led.misfit, led.since + dt
-    if heading.nis_dof > 0:
-        misfit += min(dt / _MEMORY, 1.0) * (heading.nis / heading.nis_dof - misfit)
+    squares, count = _misfit(p, cells, state, voltages)
+    if heading.nis_dof > 0 and count > 0:
+        # what its covariance covers is none: it may have begun far off along what few cells do not tell
+        off = min(squares / count, heading.nis / heading.nis_dof)
+        misfit += min(dt / _MEMORY, 1.0) * (off - misfit)
     # what no bad beginning explains counts at once
     gross = misfit > _GROSS * largest and since > _MEMORY
     if gross or (misfit > largest and since > _LONG):

@@ -148,6 +148,7 @@ def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWa
     read = readings.spoken and readings.silent == 0.0
     led = follow_gyro(
         p.led,
+        p.cells,
         before.led,
         dt,
         voltages,
