@@ -429,7 +429,12 @@ _FAULTS = (
     ),
     _isolated("isolated_cells", "different cells that were ever isolated", CELLS),
     _isolated("isolated_actuators", "different wheels and torque rods that were ever isolated", WHEELS, RODS),
-    _isolated("left_sensors", "gyro and magnetometer: how many of them were ever left out for failed", SENSORS),
+    _isolated(
+        "left_sensors",
+        "gyro and magnetometer: of how many of them axes were ever held for failed, whether they were left out or "
+        "corrected",
+        SENSORS,
+    ),
     _wrong("false_isolations", "isolations of a cell that began while no fault acted on it", CELLS),
     _wrong("false_actuator_isolations", "the same of wheels and torque rods", WHEELS, RODS),
     _wrong("falsely_left_sensors", "the same of gyro and magnetometer", SENSORS),

@@ -11,6 +11,10 @@ from css_common.message_columns import Columns
 from css_msgs.msg import SunEstimate
 
 _SORTS = ("cell", "wheel", "rod", "gyro", "magnetometer", "tachometer")
+_SENSORS = {
+    "gyro": SunEstimate.LEFT_GYRO | SunEstimate.HELD_GYRO,
+    "magnetometer": SunEstimate.LEFT_FIELD | SunEstimate.HELD_FIELD,
+}
 CONTROL = "control"
 """Who leaves out actuators, in the absence of a name."""
 
@@ -31,7 +35,7 @@ def spells(log: FlightLog) -> list[Spell]:
 
 
 def held_spells(log: FlightLog) -> list[Spell]:
-    """The times in which estimators and control left out units, by what they published."""
+    """The times in which estimators and control held units for failed, by what they published."""
     return [
         Spell(target, name, begin_s, until_s)
         for name, target, columns, on in _masks(log)
@@ -43,8 +47,8 @@ def _masks(log: FlightLog) -> Iterator[tuple[str, str, Columns, np.ndarray]]:
     """Who holds which unit for failed, and at which messages."""
     for name, columns in log.estimates.items():
         yield from _bits(name, "cell", columns, columns.isolated)
-        for target, bit in (("gyro", SunEstimate.LEFT_GYRO), ("magnetometer", SunEstimate.LEFT_FIELD)):
-            on = (columns.sensors_left & bit) != 0
+        for target, bits in _SENSORS.items():
+            on = (columns.sensors_left & bits) != 0
             if on.any():
                 yield name, target, columns, on
     if log.control is not None:

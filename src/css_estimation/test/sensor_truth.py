@@ -13,7 +13,7 @@ from css_estimation.health import aiding_health
 from css_estimation.health.aiding_health import check_aiding
 from css_estimation.health.gyroless_sight import glimpse_of
 from css_estimation.health.sight import Sight
-from css_estimation.sun.sun_heading import UNKNOWN_SKY, Aiding
+from css_estimation.sun.sun_heading import HELD_GYRO, LEFT_FIELD, LEFT_GYRO, UNKNOWN_SKY, Aiding
 
 DEG = np.pi / 180.0
 INERTIA = np.array([10.5, 8.0, 6.75])
@@ -108,7 +108,9 @@ class Judged:
             out,
         )
         self.rate_b, self.bias_b, self.variances = out[:, :3], out[:, 3:6], out[:, 6:9]
-        self.gyro_valid, self.field_valid, self.left = out[:, 9] == 1.0, out[:, 10] == 1.0, out[:, 11].astype(int)
+        self.gyro_valid, self.field_valid = out[:, 9] == 1.0, out[:, 10] == 1.0
+        said = out[:, 11].astype(int)
+        self.left, self.gyro_held = said & (LEFT_GYRO | LEFT_FIELD), (said & HELD_GYRO) != 0
         self.mode, self.nis = out[:, 12].astype(int), out[:, 13]
 
     @property

@@ -52,7 +52,7 @@ def test_a_good_gyro_is_given_on_untouched(rate, seed):
     result = judged(gyro, sun)
     assert np.array_equal(result.rate_b, gyro)
     assert result.gyro_valid.all()
-    assert not result.left.any()
+    assert not result.left.any() and not result.gyro_held.any()
     assert not result.gyro_kinds
 
 
@@ -73,6 +73,8 @@ def test_a_bias_from_the_beginning_is_found_by_the_sun_and_taken_off(rate, size,
     result = judged(gyro, sun)
     assert result.mode[-1] == GYRO_CORRECTED
     assert result.gyro_kinds == {axis: KIND_BIAS}
+    # it is told with the estimate too
+    assert np.array_equal(result.gyro_held, result.mode != GYRO_TRUSTED)
     # sigma of the filter, for all that a sight's error of a time and not of a sample is reckoned with
     assert np.all(np.abs(result.bias_b[-1] - size * DEG * np.eye(3)[axis]) < 3.0 * np.sqrt(result.variances[-1]))
     assert np.mean(np.linalg.norm(result.rate_b - omega, axis=1)[-1000:]) < 0.1 * DEG

@@ -10,7 +10,7 @@ from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.declared import builder
-from css_common.vectors import unit
+from css_common.vectors import unit, vector_of
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.gyroless_sight import Glimpse, contradicts, follow_gyro, gyro_led_parameters, initial_led
 from css_estimation.nodes.ekf import Ekf
@@ -42,7 +42,7 @@ class Turning:
         outputs = np.zeros(len(layout.cells))
         ideal_outputs(layout, tuple(self.sun_b), False, 1.0, outputs)
         outputs[outputs == 0.0] = self.earth
-        gyro = tuple(float(rate) for rate in gyro_b)
+        gyro = vector_of(np.asarray(gyro_b, float))
         self.led = follow_gyro(
             self.p, self.cells, self.led, DT, outputs, NO_SPEEDS, UNKNOWN_SKY, gyro, True, glimpse, LARGEST
         )

@@ -14,7 +14,7 @@ from css_sensors.slits import LOWER, UPPER, VERTICAL
 @pytest.mark.parametrize(
     ("module", "message", "count"),
     [
-        (sun_heading, SunEstimate, 12),
+        (sun_heading, SunEstimate, 14),
         (attitude_solution, AttitudeEstimate, 6),
         (slit_passage, SlitSunAngle, 10),
         (coning, ConingEstimate, 5),

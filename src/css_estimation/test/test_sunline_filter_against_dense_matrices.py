@@ -147,22 +147,27 @@ def test_symmetric_helpers(rng):
     np.testing.assert_allclose(product(upper(p), (1.0, 2.0, 3.0)), p @ (1.0, 2.0, 3.0), rtol=1e-13)
 
 
+# cell 3 is predicted lit and dark, cell 5 is above 0.4 of the brightest, 7 is above it by 0.01
+MANY = ((0.7, 0.7, 0.7, 0.0, 0.1, 0.5, 0.27, 0.29), 0b10101111)
+TWO = ((0.7, 0.7, 0.0, 0.02, 0.1, 0.0, 0.1, 0.0), 0b1111)
+
+
 @pytest.mark.parametrize("beyond_edge", [False, True])
-def test_cells_used_are_the_predicted_and_the_bright_ones(beyond_edge):
+@pytest.mark.parametrize(("outputs", "cells", "narrow"), [(*MANY, ()), (*TWO, (2, 3))], ids=["many", "two"])
+def test_cells_used_are_the_predicted_and_the_bright_ones(outputs, cells, narrow, beyond_edge):
     p = sunline_ekf.parameters(okeefe_values(CELLS + sunline_ekf.PARAMETERS)).sunline
     predicted_b = (0.0, 0.0, 1.0)  # all four cells of the +z side
-    voltages = np.array([0.7, 0.7, 0.7, 0.0, 0.1, 0.5, 0.27, 0.29])
+    voltages = np.array(outputs)
     prior = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
     s, cov, nis, count, mask = update_cells(
         p.layout, p.gate, p.cell_variance, beyond_edge, predicted_b, prior, voltages, 0
     )
-    # cell 3 is predicted lit and dark, cell 5 is above 0.4 of the brightest, 7 is above it by 0.01
-    assert mask == 0b10101111
-    assert count == 6
+    assert mask == cells
+    assert count == cells.bit_count()
     used = [i for i in range(8) if mask >> i & 1]
     normals = [[p.layout.cells[i][c] for c in ("nx", "ny", "nz")] for i in used]
     # of a dark cell the Sun's cosine is below that at the edge of its view, 0.5, or zero
-    variances = p.cell_variance + np.where((np.array(used) == 3) & beyond_edge, 0.5**2 / 3.0, 0.0)
+    variances = p.cell_variance + np.where(np.isin(used, narrow) & beyond_edge, 0.5**2 / 3.0, 0.0)
     expected = stacked_update(np.array(predicted_b), dense(prior), normals, voltages[used], variances)
     np.testing.assert_allclose(s, expected[0], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(dense(cov), expected[1], rtol=1e-8, atol=1e-14)

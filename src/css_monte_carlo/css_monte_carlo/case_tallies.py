@@ -15,7 +15,7 @@ from css_analysis.flight_metrics import ACQUIRED_AFTER, FINAL_TIME, POWER_POSITI
 from css_common.kernel import kernel
 from css_common.vectors import angle_between, norm, subtract
 from css_estimation.sun.sun_heading import VALIDITY_NONE, SunHeading
-from css_monte_carlo.health_tallies import ActuatorsLeft, HealthTallies, Held, new_health, tally_health
+from css_monte_carlo.health_tallies import ActuatorsLeft, HealthTallies, Held, held_sensors, new_health, tally_health
 from css_monte_carlo.step_truth import Truth
 
 REPORT_SPAN = 60.0
@@ -211,9 +211,8 @@ def tally_step(
     if heading.nis_dof > 0:
         t.innovations += heading.nis_dof
         t.nis_sum += heading.nis
-    tally_health(
-        tallies.health, c, step, truth.failing, Held(heading.isolated, left.wheels, left.rods, heading.sensors_left)
-    )
+    held = Held(heading.isolated, left.wheels, left.rods, held_sensors(heading.sensors_left))
+    tally_health(tallies.health, c, step, truth.failing, held)
     t.momentum = norm(truth.wheel_momentum_b)
     t.momentum_max = max(t.momentum_max, t.momentum)
     t.steps += 1

@@ -7,6 +7,7 @@ import numpy as np
 
 from css_analysis.fault_sums import CELLS, RODS, SENSORS, WHEELS
 from css_common.kernel import kernel
+from css_estimation.sun.sun_heading import HELD_FIELD, HELD_GYRO, LEFT_FIELD, LEFT_GYRO
 from css_monte_carlo.failing_units import Failing
 
 UNITS = 32  # bits of a mask
@@ -33,7 +34,18 @@ class Held(NamedTuple):
     cells: int
     wheels: int
     rods: int
-    sensors: int  # LEFT_*, added
+    sensors: int  # LEFT_*, added: of which axes are held for failed, or which are left out
+
+
+@kernel
+def held_sensors(said: int) -> int:
+    """Mask of LEFT_* of the sensors of which an estimate says that axes are held for failed, or that they are left out.
+
+    Args:
+        said: `SunHeading.sensors_left`.
+    """
+    gyro = LEFT_GYRO if said & (LEFT_GYRO | HELD_GYRO) else 0
+    return gyro | (LEFT_FIELD if said & (LEFT_FIELD | HELD_FIELD) else 0)
 
 
 class ActuatorsLeft(NamedTuple):

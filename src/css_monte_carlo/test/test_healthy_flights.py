@@ -2,10 +2,15 @@
 """Flights without a fault in which the Sun is hard to find: none of their sensors is held for failed."""
 
 import numpy as np
+import pytest
 
 from css_analysis.configured_mission import configured
+from css_analysis.flight_metrics import windows_of
+from css_common.health import SORT_GYRO
 from css_common.mission import load_mission
+from css_monte_carlo.case_table import case_table
 from css_monte_carlo.direct_flight import fly_and_keep
+from css_monte_carlo.stepped_flight import SteppedFlight
 
 
 def test_what_watches_the_gyro_takes_a_dark_cell_for_one_at_right_angles_to_the_sun():
@@ -16,3 +21,16 @@ def test_what_watches_the_gyro_takes_a_dark_cell_for_one_at_right_angles_to_the_
     estimates = kept["wavg/sun_estimate"]
     assert len(estimates) >= mission.steps
     assert not np.any([e.isolated | e.sensors_left for e in estimates])
+
+
+@pytest.mark.parametrize("bias_deg_h", [0.0, 7200.0])
+def test_a_gyro_without_a_fault_that_is_held_for_failed_is_counted_even_where_it_is_used_on(bias_deg_h):
+    """Its own bias is taken off: it is not left out, but the node tells of its axes, and no fault acts on them."""
+    settings = ["mission.duration=40", f"gyro.bias_deg_h={bias_deg_h}"]
+    mission = configured(load_mission("okeefe_2013", settings), case=1, estimator="wavg")
+    told = fly_and_keep(mission, ["health/wavg"])["health/wavg"]
+    sums, _ = SteppedFlight(mission).fly(np.array([1]), 10)
+    (row,) = case_table(np.array([1]), sums, mission.period_ns * 1e-9, windows_of(mission)).to_pylist()
+    held = any(SORT_GYRO in sample.sort for sample in told)
+    assert held == (bias_deg_h > 0.0)
+    assert row["left_sensors"] == row["falsely_left_sensors"] == held

@@ -16,7 +16,7 @@ from css_estimation.health.gyro_health import check_gyro
 from css_estimation.health.gyro_state import GyroHealthParameters, GyroState
 from css_estimation.health.gyroless_sight import Glimpse
 from css_estimation.health.rate_checks import new_axes
-from css_estimation.sun.sun_heading import LEFT_FIELD, LEFT_GYRO, Aiding
+from css_estimation.sun.sun_heading import HELD_FIELD, HELD_GYRO, LEFT_FIELD, LEFT_GYRO, Aiding
 
 
 class AidingHealthParameters(NamedTuple):
@@ -37,7 +37,7 @@ class Trusted(NamedTuple):
     gyro_valid: bool
     field_b: Vec3
     field_valid: bool
-    left: int  # LEFT_*, added: what it had to do without
+    left: int  # LEFT_* and HELD_*, added: what it had to do without, and what has axes that are held for failed
 
 
 class AidingHealthState(NamedTuple):
@@ -82,7 +82,7 @@ def initial_memory(p: AidingHealthParameters) -> AidingHealthMemory:
 
 @kernel
 def _sum_of(verdicts) -> int:
-    """A number that is another one for other verdicts (3,)."""
+    """A number that is another one for other verdicts (3,); 0: none is held."""
     total = 0
     for i in range(3):
         v = verdicts[i]
@@ -137,8 +137,10 @@ def check_aiding(
         aiding.sky,
         sight,
     )
+    of_gyro, of_field = _sum_of(memory.gyro_verdicts), _sum_of(memory.field_verdicts)
     left = (LEFT_GYRO if gyro_left else 0) + (LEFT_FIELD if field_left else 0)
-    told = _sum_of(memory.gyro_verdicts) + 7 * _sum_of(memory.field_verdicts)
+    left += (HELD_GYRO if of_gyro != 0 else 0) + (HELD_FIELD if of_field != 0 else 0)
+    told = of_gyro + 7 * of_field
     if told != memory.told[0]:
         memory.told[0] = told
         memory.changes[0] += 1

@@ -24,6 +24,8 @@ ECLIPSE_ECLIPSED = 1
 
 LEFT_GYRO = 1
 LEFT_FIELD = 2
+HELD_GYRO = 4
+HELD_FIELD = 8
 
 # What an orbit model says about the shadow, if there is one.
 PREDICTION_UNKNOWN = -1
@@ -98,4 +100,4 @@ class SunHeading(NamedTuple):
     mode: int  # documented with the estimator
     # of the health of sensors, which an algorithm need not fill in
     isolated: int = 0  # bit i: cell i is held for failed
-    sensors_left: int = 0  # LEFT_*, added
+    sensors_left: int = 0  # LEFT_* and HELD_*, added

@@ -6,7 +6,8 @@ The filter itself, what it does with dim and missing cells and in darkness, and 
 Two Suns. Where the cells that inform it do not span space the filter follows one of two directions, and knows of the
 other one (`other_sun`). If that turns out to be the right one the filter goes on from there: mode 1, as at its start.
 
-Dark cells. One with a narrow view says that the Sun is beyond its edge, not that it is 90 deg away.
+Dark cells. Where the lit ones do not span space, one with a narrow view says that the Sun is beyond its edge, not that
+it is 90 deg away.
 """
 
 import math

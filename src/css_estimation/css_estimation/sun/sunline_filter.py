@@ -9,6 +9,7 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot, multiply, norm, scale
 from css_estimation.sun.cell_layout import CellLayout, half_view_of, informs, missing_cells, view_margin
+from css_estimation.sun.left_open import surely_spans_space
 from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, subtract_pair, trace
 
@@ -61,8 +62,9 @@ def update_cells(
     """Updates with every cell that the propagated `sun_b` or the gate selects.
 
     Args:
-        beyond_edge: of a dark one the Sun's cosine is below that at the edge of its view, or as far below zero: with a
-            narrow view that is a variance beside that of the cell. Else it is zero, as for the paper's filter.
+        beyond_edge: where the lit cells do not span space, a dark one says that the Sun's cosine is below that at the
+            edge of its view, or as far below zero: with a narrow view that is a variance beside that of the cell. Else
+            it is zero, as for the paper's filter: what lit cells show, dark ones hold against the light of the Earth.
         top: result of `brightest`, which sees the Sun.
 
     Returns:
@@ -71,6 +73,7 @@ def update_cells(
     cells = layout.cells
     level = gate.level * voltages[top]
     _, lit_mask = lit_cells(layout, gate, voltages, top)
+    beyond_edge = beyond_edge and not surely_spans_space(cells, lit_mask)
     predicted_b, predicted_covariance = sun_b, covariance
     nis = 0.0
     mask = 0
