@@ -36,6 +36,16 @@ _UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
 _ONLY_FROM_KERNELS = {"no_cpython_wrapper": True}
 
 
+def _say_what_is_compiled() -> None:
+    # not at the beginning of a line, where it would count among what kernels are made from
+    from css_common.compile_news import follow_compiler
+
+    follow_compiler()
+
+
+_say_what_is_compiled()
+
+
 def _folder(of_sources: str) -> Path:
     # a user who names a folder has one for all sources, as numba has it
     return Path(os.environ.get("NUMBA_CACHE_DIR") or _kernels() / of_sources)
