@@ -9,11 +9,15 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 from css_common.progress_lines import EVERY
 
 FIRST = 2.0
 """Time of compiling [s] after which the first line comes."""
+
+BEGINS = "compiling kernels"
+"""How such a line begins."""
 
 TYPICAL = "usually 1 to 2 minutes"
 """What the kernels of a whole mission take."""
@@ -64,7 +68,7 @@ class CompileNews:
             if spent >= self._due:
                 self._due = spent + EVERY
                 self._say(
-                    f"compiling kernels, once for this machine and each kind of node ({TYPICAL} in all, kept for later "
+                    f"{BEGINS}, once for this machine and each kind of node ({TYPICAL} in all, kept for later "
                     f"starts): {self._kernels} in {spent:.0f} s so far, now {self._under_way[-1]}"
                 )
             self._wait()
@@ -89,6 +93,12 @@ def tell_of_compiling() -> None:
     _Wanted.news = CompileNews(lambda line: print(line, file=sys.stderr, flush=True))
 
 
+def name_of(function: Callable[..., Any]) -> str:
+    """How a function is named in lines, with its module; empty: it is one of numba's own."""
+    package, _, module = (function.__module__ or "").rpartition(".")  # what was made of a text has no module
+    return "" if package.partition(".")[0] == "numba" else ".".join(filter(None, (module, function.__qualname__)))
+
+
 def follow_compiler() -> None:
     """Hears from numba what it compiles; called where kernels are made."""
     from numba.core import event  # not at the start of commands that have no kernels
@@ -96,10 +106,7 @@ def follow_compiler() -> None:
     class Listener(event.Listener):
         def on_start(self, event: event.Event) -> None:
             if _Wanted.news is not None:
-                function = event.data["dispatcher"].py_func
-                package, _, module = function.__module__.rpartition(".")
-                own = package.partition(".")[0] != "numba"
-                _Wanted.news.began(f"{module}.{function.__qualname__}" if own else "")
+                _Wanted.news.began(name_of(event.data["dispatcher"].py_func))
 
         def on_end(self, event: event.Event) -> None:
             if _Wanted.news is not None:

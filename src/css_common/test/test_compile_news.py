@@ -9,10 +9,11 @@ import threading
 from itertools import pairwise
 from types import SimpleNamespace
 
+import numba
 import pytest
 from noting import noted
 
-from css_common.compile_news import EVERY, FIRST, CompileNews
+from css_common.compile_news import EVERY, FIRST, CompileNews, name_of
 from css_common.testing import DEADLINE
 
 LINE = r"compiling kernels, once for .* \(usually .*, kept for later starts\): (\d+) in (\d+) s so far, now ([\w. ]+)"
@@ -88,6 +89,15 @@ def test_functions_of_numba_are_neither_counted_nor_named(news, said, wall):
     wall.now += 2.0 * FIRST
     news.tell()
     assert counted(said[0])[::2] == ("1", "loop.fly")
+
+
+def test_functions_are_named_with_the_module_if_they_have_one():
+    of_a_text: dict = {}
+    exec("def made(x):\n    return x", of_a_text)
+    of_a_text["made"].__module__ = None
+    assert name_of(counted) == "test_compile_news.counted"
+    assert name_of(of_a_text["made"]) == "made"
+    assert name_of(numba.njit) == ""
 
 
 def test_a_kernel_that_takes_long_is_told_while_it_lasts(said):
