@@ -101,7 +101,7 @@ def test_no_code_is_made_for_as_many_numbers_at_once_as_this_machine_takes(expor
     assert not re.search(r"<\d+ x (double|i64|i1)>|@llvm\.masked", library.texts[0])
 
 
-def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported):
+def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported, capfd):
     library, _, calls = exported
     code = library.for_target(HOST)
     assert code.bound.operations is not None, code.bound.reason
@@ -110,6 +110,7 @@ def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported):
     for cost in made:
         assert 0 < cost.pop(OPERATIONS) <= code.bound.operations
         assert all(count <= code.bound.calls[name] for name, count in cost.items())
+    assert capfd.readouterr().err == "", "LLVM says how much stack its code takes to whoever compiles it so"
 
 
 @with_compiler
