@@ -86,11 +86,20 @@ class _Wanted:
     """Whether this process tells; and whom."""
 
     news: CompileNews | None = None
+    has_complained = False
 
 
 def tell_of_compiling() -> None:
     """From now on this process says on standard error what it compiles."""
     _Wanted.news = CompileNews(lambda line: print(line, file=sys.stderr, flush=True))
+
+
+def not_kept(folder: str, error: OSError) -> None:
+    """Says once that what is compiled cannot be written, so that the next start compiles it anew."""
+    if _Wanted.news is not None and not _Wanted.has_complained:
+        _Wanted.has_complained = True
+        reason = error.strerror or str(error)
+        print(f"compiled kernels are not kept: {folder}: cannot be written: {reason}", file=sys.stderr, flush=True)
 
 
 def name_of(function: Callable[..., Any]) -> str:

@@ -75,7 +75,24 @@ def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any
     dispatcher: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         _forgive(dispatcher)
+        _go_on_without_room(dispatcher)
     return dispatcher
+
+
+def _go_on_without_room(dispatcher: Any) -> None:
+    """Lets a kernel run that cannot be kept, as on a full disk."""
+    from css_common.compile_news import not_kept  # as above
+
+    cache = dispatcher._cache
+    save = cache.save_overload
+
+    def save_if_there_is_room(signature: Any, result: Any) -> None:
+        try:
+            save(signature, result)
+        except OSError as error:
+            not_kept(cache.cache_path, error)
+
+    cache.save_overload = save_if_there_is_room
 
 
 def _forgive(dispatcher: Any) -> None:

@@ -3,6 +3,7 @@
 
 import os
 import re
+import resource
 import subprocess
 import sys
 import threading
@@ -136,7 +137,7 @@ def main():
 """
 
 
-def test_a_command_speaks_with_a_cold_cache_and_is_silent_with_a_warm_one(tmp_path):
+def test_a_command_speaks_with_a_cold_cache_or_none_and_is_silent_with_a_warm_one(tmp_path):
     commands = tmp_path / "made_up" / "commands"
     commands.mkdir(parents=True)
     for folder in (commands.parent, commands):
@@ -144,11 +145,19 @@ def test_a_command_speaks_with_a_cold_cache_and_is_silent_with_a_warm_one(tmp_pa
     (commands / "compute.py").write_text(COMMAND)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
-    def run():
-        command = [sys.executable, "-c", PROGRAM.format(folder=str(tmp_path))]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+    def run(most_bytes=resource.RLIM_INFINITY):
+        done = subprocess.run(
+            [sys.executable, "-c", PROGRAM.format(folder=str(tmp_path))],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (most_bytes, most_bytes)),
+        )
         assert done.stdout == "30.0\n"
         return done.stderr
 
+    said = [line for line in run(most_bytes=0).splitlines() if not line.startswith("compiling")]
+    assert said == [f"compiled kernels are not kept: {said[0].split(': ')[1]}: cannot be written: File too large"]
     assert counted(run().splitlines()[0])[2].startswith("compute.")
     assert run() == ""

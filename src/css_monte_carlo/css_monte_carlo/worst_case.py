@@ -24,6 +24,7 @@ from css_common.preflight import preflight
 from css_common.sampling import sample_of
 from css_common.schema import ParameterError
 from css_common.sections import name_for_files
+from css_common.whole_files import write_whole
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
@@ -122,7 +123,7 @@ def find_worst(
     except KeyboardInterrupt:
         interrupted = True
     flown, file = search.mission_of(search.worst), study.folder / _file_name(configuration, study)
-    file.write_text(flown.text(), encoding="utf-8")
+    write_whole(file, flown.text())
     return Worst(
         configuration.columns,
         name,
