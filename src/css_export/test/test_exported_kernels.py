@@ -27,7 +27,7 @@ from css_export.programs import compiled_object, compiled_program, run_program, 
 from css_export.recorded_calls import Calls, listen
 from css_export.report import Row
 from css_export.speed import time_ratio
-from css_export.targets import TARGETS
+from css_export.targets import TARGETS, target_of
 from css_export.verification import Verdict, judged, relative_difference, run_library
 from css_recording.bag_reader import BagReader
 
@@ -305,6 +305,11 @@ def test_a_processor_that_nobody_knows_is_refused():
     text = "define void @f() {\n  ret void\n}\n"
     with pytest.raises(ExportError, match="nothing-at-all"):
         built("f", [text], ["f"], HOST._replace(name="nothing-at-all", triple="nothing-at-all"))
+
+
+def test_a_target_that_nobody_knows_is_refused_with_those_that_there_are():
+    with pytest.raises(ExportError, match=r"--target z80: unknown; expected one of x86_64, .*, or TRIPLE or"):
+        target_of("z80")
 
 
 def test_relative_differences():

@@ -202,7 +202,7 @@ def likenesses(ignored: tuple[str, ...]) -> list[str]:
     for pattern, likeness in _LIKENESSES:
         names = [name for name in ignored if pattern.fullmatch(plain_name(name_and_unit(name)[0]))]
         if names:
-            lines.append(f"{', '.join(names)} look{'s' if len(names) == 1 else ''} {likeness}")
+            lines.append(f"{listed(names)} look{'s' if len(names) == 1 else ''} {likeness}")
     return lines
 
 

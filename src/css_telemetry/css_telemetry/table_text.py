@@ -61,7 +61,7 @@ class Table(NamedTuple):
 def listed(header: Sequence[str]) -> str:
     """Names of columns for a message, which stays a line although a file may be anything."""
     names = ", ".join(header) or "empty"
-    return names if len(names) <= _LONGEST else f"{names[:_LONGEST]} ..."
+    return names if len(names) <= _LONGEST else f"{names[:_LONGEST]} ... ({len(header)} in all)"
 
 
 def name_and_unit(column: str) -> tuple[str, str]:
