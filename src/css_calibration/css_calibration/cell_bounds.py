@@ -13,7 +13,7 @@ import numpy as np
 
 from css_calibration.batch_fit import Fit
 from css_calibration.cell_data import CellData
-from css_calibration.cell_fit_model import nominal_parameters
+from css_calibration.cell_fit_model import DARK, nominal_parameters
 from css_calibration.fault_stretches import Outputs
 from css_calibration.own_evidence import OwnEvidence
 from css_calibration.recorded import Recorded
@@ -21,6 +21,8 @@ from css_sensors.cells import LARGEST_READING
 
 _ABSOLUTE, _SHARE, _EARTH, _CLOUDED = 0.08, 0.35, 0.3, 3.0  # of cells that nobody has calibrated
 _SIGMAS, _LEAST_OFF = 5.0, 0.03  # of calibrated ones
+
+_LOWEST = 0.02  # share of what a cell reads without the Sun below which it is noise that made it so little
 
 Bounds = tuple[np.ndarray, np.ndarray, np.ndarray]
 """What is expected (M, N), the least and the most."""
@@ -60,9 +62,27 @@ def wide_bounds(data: CellData) -> Bounds:
     return expected, low, lit + _ABSOLUTE + _SHARE * lit + earth
 
 
+def dark_levels(data: CellData, result: Fit) -> np.ndarray:
+    """(N,) of the batch, and no more than cells are seen to read where the light of the Earth is not predicted.
+
+    What shines on a cell now and then, and is not known, the batch takes for a dark level; but a cell that reads less
+    at times has a lower one.
+    """
+    levels = result.parameters[:, DARK].copy()
+    if data.earth_known:
+        return levels
+    for cell in range(len(levels)):
+        unlit = data.voltages[data.usable[:, cell] & ~data.seen[:, cell], cell]
+        if len(unlit):
+            levels[cell] = min(levels[cell], float(np.quantile(unlit, _LOWEST)))
+    return levels
+
+
 def narrow_bounds(data: CellData, result: Fit) -> Bounds:
     """What calibrated cells should read, and bounds by their noise."""
     earth = 0.0 if data.earth_known else _EARTH
+    # light of the Earth that nobody predicts, and that is not always there, has passed for a dark level
+    taken = np.minimum(result.parameters[:, DARK] - dark_levels(data, result), earth)
 
     def bounds(one: CellData) -> np.ndarray:
         expected, slopes, _ = one.predicted(result.parameters, result.earth)
@@ -72,7 +92,8 @@ def narrow_bounds(data: CellData, result: Fit) -> Bounds:
         # cells whose tilts were hardly told err by them
         tilt = 0.03 * np.sqrt(np.maximum(0.0, 1.0 - np.minimum(1.0, expected) ** 2)) * (expected > 0.1)
         off = _SIGMAS * sigma + _LEAST_OFF + tilt
-        return np.stack([expected, expected - off - 0.5 * data.albedo, expected + off + 0.8 * data.albedo + earth])
+        low, high = expected - off - 0.5 * data.albedo - taken, expected + off + 0.8 * data.albedo + earth
+        return np.stack([expected, low, high])
 
     dark, expected, lit = _in_doubt(data, bounds)
     return expected[0], dark[1], lit[2]
