@@ -22,7 +22,9 @@ from css_sensors.cells import LARGEST_READING
 _ABSOLUTE, _SHARE, _EARTH, _CLOUDED = 0.08, 0.35, 0.3, 3.0  # of cells that nobody has calibrated
 _SIGMAS, _LEAST_OFF = 5.0, 0.03  # of calibrated ones
 
-_LOWEST = 0.02  # share of what a cell reads without the Sun below which it is noise that made it so little
+_LOWEST = (
+    0.02  # share of what cells read without the Sun, below or above which it is noise that made it so little or much
+)
 
 Bounds = tuple[np.ndarray, np.ndarray, np.ndarray]
 """What is expected (M, N), the least and the most."""
@@ -76,6 +78,15 @@ def dark_levels(data: CellData, result: Fit) -> np.ndarray:
         if len(unlit):
             levels[cell] = min(levels[cell], float(np.quantile(unlit, _LOWEST)))
     return levels
+
+
+def unpredicted_earth(data: CellData, result: Fit, cell: int) -> float:
+    """The most light of the Earth [-] that the other cells show without the Sun, where none is predicted."""
+    if data.earth_known:
+        return 0.0
+    above = np.where(data.usable & ~data.seen, data.voltages - dark_levels(data, result), np.nan)
+    above = np.delete(above, cell, axis=1)  # what is wrong with a cell is no light of the Earth
+    return float(np.nanquantile(above, 1.0 - _LOWEST)) if np.isfinite(above).any() else 0.0
 
 
 def narrow_bounds(data: CellData, result: Fit) -> Bounds:

@@ -119,7 +119,5 @@ def target_of(text: str) -> Target:
     triple, _, processor = text.partition(":")
     if triple.count("-") >= 2:
         return Target(text.replace(":", "_"), triple, processor, runs=False)
-    known = ", ".join(TARGETS)
-    raise ExportError(
-        f"--target {unknown_name(text, TARGETS)}; expected one of {known}, or TRIPLE or TRIPLE:PROCESSOR as LLVM has them"
-    )
+    right = f"expected one of {', '.join(TARGETS)}, or TRIPLE or TRIPLE:PROCESSOR as LLVM has them"
+    raise ExportError(f"--target {unknown_name(text, TARGETS)}; {right}")
