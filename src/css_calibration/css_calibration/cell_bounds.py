@@ -65,35 +65,46 @@ def wide_bounds(data: CellData) -> Bounds:
 
 
 def dark_levels(data: CellData, result: Fit) -> np.ndarray:
-    """(N,) of the batch, and no more than cells are seen to read where the light of the Earth is not predicted.
+    """(N,) of the batch, less the light of the Earth that it took for them where nobody predicts that.
 
     What shines on a cell now and then, and is not known, the batch takes for a dark level; but a cell that reads less
-    at times has a lower one.
+    at times has a lower one, by as much as the other cells show that there is light of the Earth.
     """
     levels = result.parameters[:, DARK].copy()
-    if data.earth_known:
-        return levels
-    for cell in range(len(levels)):
-        unlit = data.voltages[data.usable[:, cell] & ~data.seen[:, cell], cell]
-        if len(unlit):
-            levels[cell] = min(levels[cell], float(np.quantile(unlit, _LOWEST)))
+    lowest = _lowest(data)
+    for cell in np.flatnonzero(np.isfinite(lowest)).tolist():
+        levels[cell] -= np.clip(levels[cell] - lowest[cell], 0.0, unpredicted_earth(data, cell))
     return levels
 
 
-def unpredicted_earth(data: CellData, result: Fit, cell: int) -> float:
+def unpredicted_earth(data: CellData, cell: int) -> float:
     """The most light of the Earth [-] that the other cells show without the Sun, where none is predicted."""
     if data.earth_known:
         return 0.0
-    above = np.where(data.usable & ~data.seen, data.voltages - dark_levels(data, result), np.nan)
+    above = _without_sun(data) - _lowest(data)
     above = np.delete(above, cell, axis=1)  # what is wrong with a cell is no light of the Earth
     return float(np.nanquantile(above, 1.0 - _LOWEST)) if np.isfinite(above).any() else 0.0
+
+
+def _without_sun(data: CellData) -> np.ndarray:
+    """(M, N) outputs of cells that do not see the Sun, NaN else."""
+    return np.where(data.usable & ~data.seen, data.voltages, np.nan)
+
+
+def _lowest(data: CellData) -> np.ndarray:
+    """(N,) what cells read in their darkest moments, NaN where they always see the Sun."""
+    lowest = np.full(data.voltages.shape[1], np.nan)
+    unlit = _without_sun(data)
+    told = np.isfinite(unlit).any(axis=0)
+    lowest[told] = np.nanquantile(unlit[:, told], _LOWEST, axis=0)
+    return lowest
 
 
 def narrow_bounds(data: CellData, result: Fit) -> Bounds:
     """What calibrated cells should read, and bounds by their noise."""
     earth = 0.0 if data.earth_known else _EARTH
     # light of the Earth that nobody predicts, and that is not always there, has passed for a dark level
-    taken = np.minimum(result.parameters[:, DARK] - dark_levels(data, result), earth)
+    taken = result.parameters[:, DARK] - dark_levels(data, result)
 
     def bounds(one: CellData) -> np.ndarray:
         expected, slopes, _ = one.predicted(result.parameters, result.earth)

@@ -108,7 +108,7 @@ def ageing(data: CellData, result: Fit, cell: int) -> Slow | None:
     explained = 1.0 - np.var(median - line) / max(float(np.var(median)), 1e-12)
     span = slope * (data.time[rows[-1]] - data.time[rows[0]])
     # the Earth goes by as evenly as cells age
-    by_earth = unpredicted_earth(data, result, cell) / float(np.median(expected[rows, cell]))
+    by_earth = unpredicted_earth(data, cell) / float(np.median(expected[rows, cell]))
     if abs(slope) < _SIGMAS * error or abs(span) < max(_CHANGE, by_earth) or explained < _STEADY:
         return None
     if _is_step(data.time[rows], ratio):

@@ -16,19 +16,18 @@ COUNT = 600
 EARTH = np.maximum(0.0, 0.2 * np.sin(np.linspace(0.0, 4.0 * np.pi, COUNT)))  # half of the time none
 
 
-def levels(outputs, fitted, *, earth_known=False, seen=False) -> np.ndarray:
-    """Of one cell with outputs (M,), for which a batch found a dark level."""
-    noise = 0.005 * np.random.default_rng(3).normal(size=COUNT)
-    all_of = np.ones((COUNT, 1), np.bool_)
-    data: Any = SimpleNamespace(
-        voltages=(outputs + noise)[:, None], usable=all_of, seen=all_of & seen, earth_known=earth_known
-    )
-    parameters = np.zeros((1, 5))
+def levels(outputs, fitted, *, earth_known=False, seen=False, beside=EARTH) -> float:
+    """Of a cell with outputs (M,), for which a batch found a dark level, next to another one."""
+    noise = 0.005 * np.random.default_rng(3).normal(size=(COUNT, 2))
+    all_of = np.ones((COUNT, 2), np.bool_)
+    voltages = np.stack([outputs, beside], axis=1) + noise
+    data: Any = SimpleNamespace(voltages=voltages, usable=all_of, seen=all_of & [seen, False], earth_known=earth_known)
+    parameters = np.zeros((2, 5))
     parameters[0, DARK] = fitted
     result: Any = SimpleNamespace(parameters=parameters)
-    (level,) = dark_levels(data, result)
+    level = dark_levels(data, result)[0]
     assert parameters[0, DARK] == fitted, "the batch's own stays"
-    return level
+    return float(level)
 
 
 def test_light_that_comes_and_goes_is_no_dark_level():
@@ -38,6 +37,10 @@ def test_light_that_comes_and_goes_is_no_dark_level():
 @pytest.mark.parametrize("bias", [0.3, -0.2])
 def test_a_level_below_which_a_cell_never_reads_is_one(bias):
     assert levels(bias + EARTH, bias) == pytest.approx(bias, abs=0.02)
+
+
+def test_what_comes_and_goes_where_others_see_no_earth_is_no_earth():
+    assert levels(EARTH, 0.12, beside=np.zeros(COUNT)) == pytest.approx(0.12, abs=0.03)
 
 
 def test_what_is_predicted_has_not_passed_for_a_level():
@@ -51,8 +54,7 @@ def test_a_cell_that_is_always_lit_tells_nothing_else():
 def earth_beside(cell: int, outputs: np.ndarray, *, earth_known=False) -> float:
     all_of = np.ones(outputs.shape, np.bool_)
     data: Any = SimpleNamespace(voltages=outputs, usable=all_of, seen=~all_of, earth_known=earth_known)
-    result: Any = SimpleNamespace(parameters=np.zeros((outputs.shape[1], 5)))
-    return unpredicted_earth(data, result, cell)
+    return unpredicted_earth(data, cell)
 
 
 def test_the_earth_of_a_recording_is_what_other_cells_read_without_the_sun():
