@@ -43,6 +43,12 @@ def _say_what_is_compiled() -> None:
     follow_compiler()
 
 
+def _say_not_kept(folder: str, error: OSError) -> None:
+    from css_common.compile_news import not_kept  # as above
+
+    not_kept(folder, error)
+
+
 _say_what_is_compiled()
 
 
@@ -75,28 +81,11 @@ def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any
     dispatcher: Any = numba.njit(**options)(function)
     if not numba.config.DISABLE_JIT:  # type: ignore[attr-defined]  # made at run time
         _forgive(dispatcher)
-        _go_on_without_room(dispatcher)
     return dispatcher
 
 
-def _go_on_without_room(dispatcher: Any) -> None:
-    """Lets a kernel run that cannot be kept, as on a full disk."""
-    from css_common.compile_news import not_kept  # as above
-
-    cache = dispatcher._cache
-    save = cache.save_overload
-
-    def save_if_there_is_room(signature: Any, result: Any) -> None:
-        try:
-            save(signature, result)
-        except OSError as error:
-            not_kept(cache.cache_path, error)
-
-    cache.save_overload = save_if_there_is_room
-
-
 def _forgive(dispatcher: Any) -> None:
-    """Lets the cache be made anew that names a type which cannot be imported here.
+    """Lets the cache be made anew that names a type which cannot be imported here, and kernels run that it cannot hold.
 
     Who calls a kernel with a type of its own, as tests do, leaves its name among what is cached of that kernel; numba
     reads the names of all types whichever is asked for.
@@ -108,6 +97,9 @@ def _forgive(dispatcher: Any) -> None:
             return compile_types(signature)
         except (ImportError, AttributeError):
             shutil.rmtree(dispatcher.stats.cache_path, ignore_errors=True)
+            return compile_types(signature)
+        except OSError as error:  # it is compiled, and a full disk has no room for it
+            _say_not_kept(dispatcher.stats.cache_path, error)
             return compile_types(signature)
 
     dispatcher.compile = compile_anew
