@@ -83,6 +83,13 @@ def test_each_kind_is_found_by_name_and_time(flight, spoil):
     assert first.evidence
 
 
+@pytest.mark.parametrize("case", [2, 3])
+def test_light_of_an_earth_that_nobody_predicts_makes_no_cell_a_liar(case):
+    """Four cells that look away from the Sun read the Earth or nothing; by a mean of both they were dead or biased."""
+    recorded = without_truth(flown(faulted("okeefe_2013", case, None)))
+    assert verdicts(check(recorded, reference="cells")) == {}
+
+
 def test_healthy_cells_are_called_so_by_every_reference(flight):
     for recorded, every in ((flight.recorded, 2), (without_truth(flight), 4)):
         some = recorded.at(np.arange(0, len(recorded.stamp_ns), every))

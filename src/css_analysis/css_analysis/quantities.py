@@ -224,6 +224,7 @@ _POWER_LATE = Quantity(
     "share of the last measures.late_time of sunlight with the Sun within 30 deg of the array normal",
     heading="power\npositive\nlate",
     form="{:.3f}",
+    without_value="the flight or its truth has no sunlight, or measures.late_time is 0",
     measure=lambda m: m.flight.power_positive_late(),
     tally=_mean("late_within", "late_lit"),
 )

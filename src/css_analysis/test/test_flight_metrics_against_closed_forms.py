@@ -254,6 +254,10 @@ def test_criteria():
     ]
     assert "below criteria.rate_final_deg_s.min" in criteria_failures({"rate_final_deg_s": {"min": 1.0}}, runs)[0]
     assert "has no value" in criteria_failures(met, [never])[0]
+    dark = [runs[0] | {"power_positive_late": None}]
+    assert criteria_failures({"power_positive_late": {"min": 0.9}}, dark)[0].endswith(
+        "has no sunlight, or measures.late_time is 0"
+    )
     assert "did you mean power_positive_s?" in criteria_failures({"power_positve_s": {"max": 1.0}}, runs)[0]
     assert len(criteria_failures({"heading_error_mean_deg": {"max": 4.0}}, [beside])) == 1, "a replay: all are judged"
     assert criteria_failures(met, []) != []

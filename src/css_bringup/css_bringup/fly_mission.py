@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
+from css_bringup.compiling_processes import CompilingProcesses
 from css_bringup.composed import ComposedFlight
 from css_bringup.flight_result import FlightResult
 from css_bringup.processes import Supervisor, fly_processes
@@ -102,15 +103,17 @@ def _fly_processes(
     logs = places.logs() / "flights" / flight
     status = f"flying {mission.name}, one process per node; logs in {logs}"
     named = 0
+    compiling = CompilingProcesses()
 
-    def name_restarts(supervisor: Supervisor) -> None:
+    def tell(supervisor: Supervisor) -> None:
         nonlocal named
         for note in supervisor.notes[named:]:
             print(note, file=sys.stderr, flush=True)
         named = len(supervisor.notes)
+        compiling.tell({name: child.log for name, child in supervisor.children.items()})
 
     with console.status(escape(status)) if _live(console) else still_working(f"flying {mission.name}"):
-        return fly_processes(mission, bag, logs, name_restarts, lambda: stop.came, overwrite=overwrite)
+        return fly_processes(mission, bag, logs, tell, lambda: stop.came, overwrite=overwrite)
 
 
 def _fly_composed(

@@ -13,7 +13,7 @@ import numpy as np
 
 from css_calibration.batch_fit import Fit
 from css_calibration.cell_data import CellData
-from css_calibration.cell_fit_model import nominal_parameters
+from css_calibration.cell_fit_model import DARK, nominal_parameters
 from css_calibration.fault_stretches import Outputs
 from css_calibration.own_evidence import OwnEvidence
 from css_calibration.recorded import Recorded
@@ -21,6 +21,10 @@ from css_sensors.cells import LARGEST_READING
 
 _ABSOLUTE, _SHARE, _EARTH, _CLOUDED = 0.08, 0.35, 0.3, 3.0  # of cells that nobody has calibrated
 _SIGMAS, _LEAST_OFF = 5.0, 0.03  # of calibrated ones
+
+_LOWEST = (
+    0.02  # share of what cells read without the Sun, below or above which it is noise that made it so little or much
+)
 
 Bounds = tuple[np.ndarray, np.ndarray, np.ndarray]
 """What is expected (M, N), the least and the most."""
@@ -60,9 +64,47 @@ def wide_bounds(data: CellData) -> Bounds:
     return expected, low, lit + _ABSOLUTE + _SHARE * lit + earth
 
 
+def dark_levels(data: CellData, result: Fit) -> np.ndarray:
+    """(N,) of the batch, less the light of the Earth that it took for them where nobody predicts that.
+
+    What shines on a cell now and then, and is not known, the batch takes for a dark level; but a cell that reads less
+    at times has a lower one, by as much as the other cells show that there is light of the Earth.
+    """
+    levels = result.parameters[:, DARK].copy()
+    lowest = _lowest(data)
+    for cell in np.flatnonzero(np.isfinite(lowest)).tolist():
+        levels[cell] -= np.clip(levels[cell] - lowest[cell], 0.0, unpredicted_earth(data, cell))
+    return levels
+
+
+def unpredicted_earth(data: CellData, cell: int) -> float:
+    """The most light of the Earth [-] that the other cells show without the Sun, where none is predicted."""
+    if data.earth_known:
+        return 0.0
+    above = _without_sun(data) - _lowest(data)
+    above = np.delete(above, cell, axis=1)  # what is wrong with a cell is no light of the Earth
+    return float(np.nanquantile(above, 1.0 - _LOWEST)) if np.isfinite(above).any() else 0.0
+
+
+def _without_sun(data: CellData) -> np.ndarray:
+    """(M, N) outputs of cells that do not see the Sun, NaN else."""
+    return np.where(data.usable & ~data.seen, data.voltages, np.nan)
+
+
+def _lowest(data: CellData) -> np.ndarray:
+    """(N,) what cells read in their darkest moments, NaN where they always see the Sun."""
+    lowest = np.full(data.voltages.shape[1], np.nan)
+    unlit = _without_sun(data)
+    told = np.isfinite(unlit).any(axis=0)
+    lowest[told] = np.nanquantile(unlit[:, told], _LOWEST, axis=0)
+    return lowest
+
+
 def narrow_bounds(data: CellData, result: Fit) -> Bounds:
     """What calibrated cells should read, and bounds by their noise."""
     earth = 0.0 if data.earth_known else _EARTH
+    # light of the Earth that nobody predicts, and that is not always there, has passed for a dark level
+    taken = result.parameters[:, DARK] - dark_levels(data, result)
 
     def bounds(one: CellData) -> np.ndarray:
         expected, slopes, _ = one.predicted(result.parameters, result.earth)
@@ -72,7 +114,8 @@ def narrow_bounds(data: CellData, result: Fit) -> Bounds:
         # cells whose tilts were hardly told err by them
         tilt = 0.03 * np.sqrt(np.maximum(0.0, 1.0 - np.minimum(1.0, expected) ** 2)) * (expected > 0.1)
         off = _SIGMAS * sigma + _LEAST_OFF + tilt
-        return np.stack([expected, expected - off - 0.5 * data.albedo, expected + off + 0.8 * data.albedo + earth])
+        low, high = expected - off - 0.5 * data.albedo - taken, expected + off + 0.8 * data.albedo + earth
+        return np.stack([expected, low, high])
 
     dark, expected, lit = _in_doubt(data, bounds)
     return expected[0], dark[1], lit[2]

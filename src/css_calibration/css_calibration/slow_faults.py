@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_calibration.batch_fit import Fit
+from css_calibration.cell_bounds import unpredicted_earth
 from css_calibration.cell_data import CellData
 from css_calibration.fault_stretches import Outputs
 from css_calibration.recorded import Recorded
@@ -106,7 +107,9 @@ def ageing(data: CellData, result: Fit, cell: int) -> Slow | None:
     line = level + slope * off
     explained = 1.0 - np.var(median - line) / max(float(np.var(median)), 1e-12)
     span = slope * (data.time[rows[-1]] - data.time[rows[0]])
-    if abs(slope) < _SIGMAS * error or abs(span) < _CHANGE or explained < _STEADY:
+    # the Earth goes by as evenly as cells age
+    by_earth = unpredicted_earth(data, cell) / float(np.median(expected[rows, cell]))
+    if abs(slope) < _SIGMAS * error or abs(span) < max(_CHANGE, by_earth) or explained < _STEADY:
         return None
     if _is_step(data.time[rows], ratio):
         return None

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_calibration.batch_fit import Fit
+from css_calibration.cell_bounds import dark_levels
 from css_calibration.cell_data import CellData
 from css_calibration.cell_fit_model import DARK, GAIN
 from css_calibration.fault_stretches import Outputs, Stretch, kind_in
@@ -210,7 +211,7 @@ def _beyond_calibration(thin: Recorded, data: CellData, result: Fit, cell: int) 
     columns = unknowns.column_of()
     left = np.sqrt(np.diag(result.covariance))
     begin, end = int(thin.stamp_ns[0]), int(thin.stamp_ns[-1])
-    gain, dark = parameters[cell, GAIN], parameters[cell, DARK]
+    gain, dark = parameters[cell, GAIN], dark_levels(data, result)[cell]
     of_gain = left[columns[cell, GAIN]] * unknowns.ignorance.gain
     # by the Sun alone: what shines on a cell that only sees the Earth, nobody knows so well
     sunlit = int((data.seen & data.usable & (data.voltages > _LIT))[:, cell].sum())

@@ -161,14 +161,21 @@ def guarded(
     try:
         return command()
     except failed as error:
-        complain(prog, error)
+        complain(prog, _words(error))
         return FAILED
     except wrong as error:
-        complain(prog, error)
+        complain(prog, _words(error))
         return USAGE
     except KeyboardInterrupt:
         print(f"{short_name(prog)}: {interrupted}", file=sys.stderr, flush=True)
         return INTERRUPTED
+
+
+def _words(error: Exception) -> str:
+    """What an error says; of the system the file and the reason, without a number that nobody knows."""
+    if isinstance(error, OSError) and error.strerror:
+        return f"{error.filename}: {error.strerror}" if error.filename else error.strerror
+    return str(error)
 
 
 def implementation(module: str) -> Callable[..., int]:

@@ -14,6 +14,7 @@ from types import ModuleType
 
 from css_common import network, security, supervised
 from css_common.command import plain_interrupts
+from css_common.compile_news import tell_of_compiling
 
 _USAGE = 2
 _INTERRUPTED = 130
@@ -23,6 +24,7 @@ def main() -> int:
     """Runs `main` of PACKAGE/nodes/NAME.py or PACKAGE/commands/NAME.py, started as lib/PACKAGE/NAME; its exit code."""
     with plain_interrupts():
         supervised.take_on()
+        tell_of_compiling()
         module = _module(Path(sys.argv[0]))
     if not _settle_network(module.__name__):
         return _USAGE

@@ -37,6 +37,22 @@ _UNCOUNTED: dict[str, Any] = _OPTIONS | {"_nrt": False}
 _ONLY_FROM_KERNELS = {"no_cpython_wrapper": True}
 
 
+def _say_what_is_compiled() -> None:
+    # not at the beginning of a line, where it would count among what kernels are made from
+    from css_common.compile_news import follow_compiler
+
+    follow_compiler()
+
+
+def _say_not_kept(folder: str, error: OSError) -> None:
+    from css_common.compile_news import not_kept  # as above
+
+    not_kept(folder, error)
+
+
+_say_what_is_compiled()
+
+
 def _folder(of_sources: str) -> Path:
     # a user who names a folder has one for all sources, as numba has it
     return Path(os.environ.get("NUMBA_CACHE_DIR") or _kernels() / of_sources)
@@ -70,7 +86,7 @@ def _compiled(function: Callable[..., Any], folder: Path, options: dict[str, Any
 
 
 def _forgive(dispatcher: Any) -> None:
-    """Lets the cache be made anew that names a type which cannot be imported here.
+    """Lets the cache be made anew that names a type which cannot be imported here, and kernels run that it cannot hold.
 
     Who calls a kernel with a type of its own, as tests do, leaves its name among what is cached of that kernel; numba
     reads the names of all types whichever is asked for.
@@ -82,6 +98,9 @@ def _forgive(dispatcher: Any) -> None:
             return compile_types(signature)
         except (ImportError, AttributeError):
             shutil.rmtree(dispatcher.stats.cache_path, ignore_errors=True)
+            return compile_types(signature)
+        except OSError as error:  # it is compiled, and a full disk has no room for it
+            _say_not_kept(dispatcher.stats.cache_path, error)
             return compile_types(signature)
 
     dispatcher.compile = compile_anew

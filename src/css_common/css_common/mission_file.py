@@ -79,6 +79,10 @@ def _sections(bodies: Mapping[str, Any], space: str, place: str) -> Iterator[tup
     for key, body in bodies.items():
         name = f"{space}/{key}" if space else key
         here = place if space else f"{place}: {key}"
+        if isinstance(body, (str, int, float, list)) and not space and "/" not in key:
+            raise MissionError(
+                f"{here}: stands at the top, expected below a section, such as /**: {{{_PARAMETERS}: ...}}"
+            )
         if not isinstance(body, Mapping) or (_PARAMETERS in body and len(body) > 1):
             raise MissionError(f"{here}: expected the one key {_PARAMETERS} below it")
         if _PARAMETERS not in body:

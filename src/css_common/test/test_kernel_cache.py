@@ -14,9 +14,11 @@ from pathlib import Path
 import pytest
 from presence import present
 
+import css_common.compile_news
 import css_common.kernel
 import css_common.linked_code
 import css_common.places
+import css_common.progress_lines
 from css_common import boxed_tuples, kernel_sources
 from css_common.kernel_sources import kernel_modules, sources_of
 
@@ -44,7 +46,15 @@ class Project:
         for package in ("css_common", "css_environment", "css_sim", "css_sim/nodes"):
             (root / package).mkdir()
             (root / package / "__init__.py").touch()
-        for module in (boxed_tuples, css_common.kernel, kernel_sources, css_common.linked_code, css_common.places):
+        for module in (
+            boxed_tuples,
+            css_common.compile_news,
+            css_common.kernel,
+            kernel_sources,
+            css_common.linked_code,
+            css_common.places,
+            css_common.progress_lines,
+        ):
             shutil.copy(present(module.__file__), root / "css_common")
         self.write_inner("1.0")
         (root / "css_sim" / "outer.py").write_text(OUTER)

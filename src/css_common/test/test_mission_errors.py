@@ -44,6 +44,8 @@ NOT_A_PARAMETER_FILE = {
     "[1, 2]": "expected node names at the top, found list",
     "just words": "expected node names at the top, found str",
     "/**: {mission: {name: x}}": "/**: expected the one key ros__parameters below it",
+    "extends: okeefe_2013": "extends: stands at the top, expected below a section",
+    "seed: 3": "seed: stands at the top, expected below a section, such as /**: {ros__parameters: ...}",
     "/**:": "/**: expected the one key ros__parameters below it",
     "/**: {ros__parameters: }": "/**: ros__parameters must hold keys and values",
     "/**: 3": "/**: expected the one key ros__parameters below it",

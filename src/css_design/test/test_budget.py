@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Budgets against closed forms and against flights: propagation, the Monte Carlo beside it, and recordings."""
 
+import io
 import json
 import math
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from css_bringup.commands import fly
 from css_common.command import USAGE
@@ -23,6 +25,7 @@ from css_design.budget.turning import Follower
 from css_design.commands import budget
 from css_design.errors import DesignError
 from css_design.new_mission.new_mission import new_mission, read_items
+from css_design.verbs.budget import explain_signs
 from css_monte_carlo.mission_flight import MissionFlight
 
 STARING = (
@@ -216,6 +219,13 @@ def test_remarks_say_where_it_disagrees():
     assert "hidden by the others" in remark_on(1.0, Split(about(1.0), about(0.2)), 2.0)
     assert "of second order it makes 57.30 deg" in remark_on(0.3, Split(about(1.0), about(1.0)), 2.0, 1.0)
     assert remark_on(0.05, Split(about(0.01, 0.001), about(0.0)), 2.0) == ""  # too small to matter
+
+
+@pytest.mark.parametrize(("numbers", "words"), [((1.0, math.nan), ""), ((1.0, -0.2), "is less, by the square of")])
+def test_a_number_below_zero_is_explained(numbers, words):
+    out = io.StringIO()
+    explain_signs(numbers, Console(file=out))
+    assert words in out.getvalue() and bool(words) == bool(out.getvalue())
 
 
 def test_the_body_follows_a_steady_error_and_not_a_fast_one():

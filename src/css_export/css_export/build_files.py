@@ -3,6 +3,7 @@
 
 from pathlib import Path
 
+from css_common.whole_files import write_whole
 from css_export.bare_metal import machine_flags, run_flags, write_machine
 from css_export.flown import INPUT, OUTPUT, PARAMETERS, STATE
 from css_export.library import Library, MachineCode
@@ -25,7 +26,7 @@ def write_build_files(library: Library, codes: list[MachineCode], folder: Path) 
         if code.target.machine:
             write_machine(folder / code.target.name)
     for name, text in texts.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        write_whole(folder / name, text)
 
 
 def makefile(library: Library, codes: list[MachineCode]) -> str:

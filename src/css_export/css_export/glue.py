@@ -7,6 +7,7 @@ compiled against declarations of the few functions that they use, not against th
 
 from pathlib import Path
 
+from css_common.whole_files import write_whole
 from css_export.library import Library
 
 _MADE = "Made by `sunpoint export` as a beginning, to be edited. Compiled against declarations alone, never run."
@@ -27,7 +28,7 @@ def write_glue(library: Library, folder: Path) -> None:
     }
     for place, text in texts.items():
         (folder / place).parent.mkdir(exist_ok=True)
-        (folder / place).write_text(text, encoding="utf-8")
+        write_whole(folder / place, text)
 
 
 def component_name(library: Library) -> str:

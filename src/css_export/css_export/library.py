@@ -11,6 +11,7 @@ import llvmlite
 import numba
 
 from css_common.mission import Mission
+from css_common.whole_files import write_whole
 from css_export.archive import archive
 from css_export.c_main import main_text
 from css_export.data_text import constant_text, init_text, limits_text, step_text, version_text
@@ -185,5 +186,5 @@ def write_library(library: Library, codes: list[MachineCode], folder: Path) -> l
         files[place / f"{library.prefix}.o"] = code.object
         files[place / f"lib{library.prefix}.a"] = code.archive
     for file, data in files.items():
-        file.write_bytes(data)
+        write_whole(file, data)
     return list(files)

@@ -29,6 +29,7 @@ _PICKLED = re.compile(r'^@\.const\.pickledata\.[0-9a-f]+(?:\.\d+)? = .*? c"(.*)"
 _DECLARED = re.compile(r"^declare .*?@(\"[^\"]+\"|[\w.$]+)\(", re.MULTILINE)
 _HOST_ATTRIBUTES = re.compile(r'"(?:target-cpu|target-features|tune-cpu)"="[^"]*"')
 _DEFINITION = re.compile(r"^(define .*?) \{$", re.MULTILINE)
+_TELL_STACK = ' "warn-stack-size"="0"'
 _CALLED = re.compile(r"(?:call|invoke) .*?@(\"[^\"]+\"|[\w.$]+)\(")
 # or what stands between quotes, to be passed over: a string may end in what looks like the sign of a name
 _LONG_NAME = re.compile(r'(%)("[^"]{200,}"|[\w.$-]{200,})()|"[^"]*"')
@@ -102,15 +103,15 @@ def _emitted(asked: dict[str, Any]) -> dict[str, Any]:
         _optimise(module, machine)
         text = str(module)
     refuse(asked["name"], text, asked["texts"])
-    told = llvm.parse_assembly(_with_short_names(_DEFINITION.sub(r'\1 "warn-stack-size"="0" {', text), "sunpoint.2"))
+    told = llvm.parse_assembly(_with_short_names(_DEFINITION.sub(rf"\1{_TELL_STACK} {{", text), "sunpoint.2"))
     told.verify()
     calls = {
         function.name: sorted({found.strip('"') for found in _CALLED.findall(str(function))})
         for function in told.functions
         if not function.is_declaration
     }
-    # before machine code is made of it, which changes it
-    text = str(told)
+    # before machine code is made of it, which changes it; whoever runs it is not to be told of its stack
+    text = str(told).replace(_TELL_STACK, "")
     return {"object": machine.emit_object(told).hex(), "calls": calls, "text": text}
 
 

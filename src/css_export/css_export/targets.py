@@ -119,4 +119,5 @@ def target_of(text: str) -> Target:
     triple, _, processor = text.partition(":")
     if triple.count("-") >= 2:
         return Target(text.replace(":", "_"), triple, processor, runs=False)
-    raise ExportError(f"--target {unknown_name(text, TARGETS)}, or TRIPLE or TRIPLE:PROCESSOR as LLVM names them")
+    right = f"expected one of {', '.join(TARGETS)}, or TRIPLE or TRIPLE:PROCESSOR as LLVM has them"
+    raise ExportError(f"--target {unknown_name(text, TARGETS)}; {right}")

@@ -27,7 +27,7 @@ from css_export.programs import compiled_object, compiled_program, run_program, 
 from css_export.recorded_calls import Calls, listen
 from css_export.report import Row
 from css_export.speed import time_ratio
-from css_export.targets import TARGETS
+from css_export.targets import TARGETS, target_of
 from css_export.verification import Verdict, judged, relative_difference, run_library
 from css_recording.bag_reader import BagReader
 
@@ -101,7 +101,7 @@ def test_no_code_is_made_for_as_many_numbers_at_once_as_this_machine_takes(expor
     assert not re.search(r"<\d+ x (double|i64|i1)>|@llvm\.masked", library.texts[0])
 
 
-def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported):
+def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported, capfd):
     library, _, calls = exported
     code = library.for_target(HOST)
     assert code.bound.operations is not None, code.bound.reason
@@ -110,6 +110,7 @@ def test_no_step_of_a_flight_makes_more_operations_than_it_can(exported):
     for cost in made:
         assert 0 < cost.pop(OPERATIONS) <= code.bound.operations
         assert all(count <= code.bound.calls[name] for name, count in cost.items())
+    assert capfd.readouterr().err == "", "LLVM says how much stack its code takes to whoever compiles it so"
 
 
 @with_compiler
@@ -304,6 +305,11 @@ def test_a_processor_that_nobody_knows_is_refused():
     text = "define void @f() {\n  ret void\n}\n"
     with pytest.raises(ExportError, match="nothing-at-all"):
         built("f", [text], ["f"], HOST._replace(name="nothing-at-all", triple="nothing-at-all"))
+
+
+def test_a_target_that_nobody_knows_is_refused_with_those_that_there_are():
+    with pytest.raises(ExportError, match=r"--target z80: unknown; expected one of x86_64, .*, or TRIPLE or"):
+        target_of("z80")
 
 
 def test_relative_differences():

@@ -3,7 +3,6 @@
 
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -13,11 +12,11 @@ import pyarrow as pa
 from css_analysis.errors import StudyError
 from css_analysis.flight_metrics import windows_of
 from css_common.mission import mission_from_text
-from css_common.processors import usable_processors
 from css_monte_carlo.case_missions import drawn_columns
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import Tallies
 from css_monte_carlo.drawn_faults import COLUMN, fault_column, has_faults
+from css_monte_carlo.flight_threads import FlightThreads, go_on_if_waited_for
 from css_monte_carlo.health_tallies import HealthTallies
 from css_monte_carlo.loop import Cases, Vehicle, fly_block
 from css_monte_carlo.measures import CaseTallies
@@ -108,6 +107,7 @@ def _fly_together(
     # no steps: compiled, or loaded, before time is taken
     fly_block(first.vehicle, cases, states.rows, states.like, nothing, flight.marks[:0], 0, tallies, trace)
     for vehicle, tables, begin, end in _blocks(flight, cases):
+        go_on_if_waited_for()
         around, marks = flight.surroundings.block(begin, end - begin), flight.marks[begin:end]
         start = time.thread_time()
         fly_block(vehicle, tables, states.rows, states.like, around, marks, begin, tallies, trace)
@@ -137,7 +137,7 @@ def fly_in_threads(
         progress: told how many cases are done, and of how many.
     """
     numbers = [np.arange(first, min(first + _SHARE, cases)) for first in range(0, cases, _SHARE)]
-    with ThreadPoolExecutor(usable_processors()) as pool:
+    with FlightThreads() as pool:
         futures = [[pool.submit(fly_cases, flight, part, 1, guess_deg) for part in numbers] for flight in flights]
         done, total = 0, cases * len(flights)
         for of_flight in futures:

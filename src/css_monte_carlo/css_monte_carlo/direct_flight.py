@@ -20,6 +20,7 @@ from css_common.mission import Mission, MissionError, Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
 from css_common.stepping import Stepper
+from css_monte_carlo.flight_threads import go_on_if_waited_for
 
 
 def fly_directly(mission: Mission) -> FlightLog:
@@ -84,6 +85,7 @@ def _fly(mission: Mission, wires: "Wires") -> None:
     assert isinstance(clockwork, Plant)
     outgoing = clockwork.begin()
     while not clockwork.finished:
+        go_on_if_waited_for()
         bus: dict[str, Sample] = {}
         plant.publish(outgoing, wires, bus)
         for part in others:

@@ -4,12 +4,14 @@
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import Future, as_completed
+from types import TracebackType
 from typing import Any, NamedTuple, Self
 
 from css_analysis.errors import StudyError
 from css_common.processors import usable_processors
 from css_monte_carlo.chunk import ChunkTask, flown_task
+from css_monte_carlo.flight_threads import FlightThreads
 from css_monte_carlo.study_folder import parquet_bytes
 
 
@@ -33,7 +35,9 @@ class Scheduler(ABC):
         return self
 
     @abstractmethod
-    def __exit__(self, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         """Gives up what it holds."""
 
     @abstractmethod
@@ -49,11 +53,12 @@ class ThreadScheduler(Scheduler):
     """
 
     def __init__(self, threads: int | None = None) -> None:
-        self._pool = ThreadPoolExecutor(threads or usable_processors())
+        self._pool = FlightThreads(threads)
 
-    def __exit__(self, *_: object) -> None:
-        # an interrupt waits for the chunks that fly, not for those that only wait
-        self._pool.shutdown(cancel_futures=True)
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._pool.__exit__(kind, error, trace)
 
     def run(self, tasks: Mapping[str, ChunkTask]) -> Iterator[tuple[str, ChunkResult]]:
         """Results by name, in the order in which they come."""

@@ -8,7 +8,6 @@ one within 3 sigma. Numbers of cases are names, not quantities: a child flies th
 import math
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -25,9 +24,11 @@ from css_common.preflight import preflight
 from css_common.sampling import sample_of
 from css_common.schema import ParameterError
 from css_common.sections import name_for_files
+from css_common.whole_files import write_whole
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.chunk import fly_cases
+from css_monte_carlo.flight_threads import FlightThreads
 from css_monte_carlo.measures import CaseTallies
 from css_monte_carlo.mission_flight import MissionFlight
 from css_monte_carlo.mission_parts import NoPlace
@@ -122,7 +123,7 @@ def find_worst(
     except KeyboardInterrupt:
         interrupted = True
     flown, file = search.mission_of(search.worst), study.folder / _file_name(configuration, study)
-    file.write_text(flown.text(), encoding="utf-8")
+    write_whole(file, flown.text())
     return Worst(
         configuration.columns,
         name,
@@ -201,7 +202,7 @@ class _Search:
         if dimensions == 0 or len(self._first) < 5 or self._most < 2 * len(self._first):
             return  # nothing to move: the worst of the study is the worst
         bounds = [(_EDGE, 1.0 - _EDGE)] * dimensions + [(0, len(self._own_cases) - 1)]
-        with ThreadPoolExecutor(threads) as pool:
+        with FlightThreads(threads) as pool:
             differential_evolution(
                 self._cost,
                 bounds,

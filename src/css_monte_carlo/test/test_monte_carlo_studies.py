@@ -5,6 +5,8 @@ import os
 import signal
 import subprocess
 import sys
+import threading
+import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -14,7 +16,8 @@ import pytest
 from css_analysis.errors import StudyError
 from css_analysis.study_summary import rows_of
 from css_common.mission import load_mission
-from css_monte_carlo import study
+from css_common.testing import DEADLINE
+from css_monte_carlo import chunk, study
 from css_monte_carlo.chunk import ChunkTask
 from css_monte_carlo.schedulers import ChunkResult, DaskScheduler, Scheduler, ThreadScheduler, run_task
 from css_monte_carlo.study import Configuration, read_study, run_study
@@ -107,6 +110,34 @@ def test_interrupted_study_goes_on_and_ends_with_the_same_bytes(whole, tmp_path,
     resumed = fly(tmp_path / "s", progress=lambda done, total: told.append((done, total)))
     assert told[0] == (6, 2 * CASES) and told[-1] == (2 * CASES, 2 * CASES)
     assert resumed.flown == (2 * CASES - 6) * 120
+    assert contents(tmp_path / "s") == contents(whole.folder)
+
+
+def test_an_interrupt_gives_up_what_flies_and_the_study_goes_on(whole, tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "CHUNK_CASES", 2)
+    monkeypatch.setattr(chunk, "BLOCK_STEPS", 1)
+    flown: list[int] = []
+    in_the_air = threading.Event()
+
+    def fly_block(*arguments):
+        flown.append(1)
+        if len(flown) > 200:  # in the middle of the second chunk
+            in_the_air.set()
+            time.sleep(0.1)
+        return fly_a_block(*arguments)
+
+    def interrupt(done, total):
+        if done == 2:
+            assert in_the_air.wait(DEADLINE)
+            raise KeyboardInterrupt
+
+    fly_a_block = chunk.fly_block
+    monkeypatch.setattr(chunk, "fly_block", fly_block)
+    with pytest.raises(KeyboardInterrupt):
+        fly(tmp_path / "s", threads=1, progress=interrupt)
+    assert len(flown) < 235, "it ended before its last step"
+    monkeypatch.undo()
+    assert fly(tmp_path / "s").flown > 0
     assert contents(tmp_path / "s") == contents(whole.folder)
 
 

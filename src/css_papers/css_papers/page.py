@@ -4,12 +4,12 @@
 In HTML the figures that were drawn inside `keep_figures` can be zoomed; others are the pictures beside the page.
 """
 
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from css_analysis.figure_style import kept_figure
+from css_common.whole_files import write_whole
 from css_papers.rows import Row
 from css_report.blocks import Block, Commands, Link, Listing, Page, Picture, Section, Table
 from css_report.drawn_figures import plots_of
@@ -38,10 +38,7 @@ def write_page(page: Page, folder: Path, name: str = FRONT) -> list[Path]:
     files = [folder / f"{name}.html", folder / _markdown_name(name)]
     sections = [Section(s.title, [b for block in s.blocks for b in _drawn(block, folder)]) for s in page.sections]
     for path, text in zip(files, (html_of(page._replace(sections=sections)), markdown_of(page)), strict=True):
-        # a page that is cut short must not look like one
-        temporary = path.with_name(f".{path.name}.new")
-        temporary.write_text(text, encoding="utf-8")
-        os.replace(temporary, path)
+        write_whole(path, text)
     return files
 
 

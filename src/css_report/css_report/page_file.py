@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Writing a page, and what is said of it."""
 
-import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from css_common.whole_files import write_whole
 from css_report.blocks import Page
 from css_report.errors import ReportError
 from css_report.html_page import anchor, html_of
@@ -30,14 +29,9 @@ def write_html(page: Page, file: Path) -> PageFile:
         ReportError: the file cannot be written.
     """
     data = html_of(page).encode("utf-8", "replace")
-    temporary = file.with_name(f".{file.name}.{os.getpid()}")
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(data)
-        os.replace(temporary, file)
+        write_whole(file, data)
     except OSError as error:
         raise ReportError(f"{file}: the page cannot be written: {error.strerror}") from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
     return PageFile(file, len(data), [anchor(section.title) for section in page.sections])

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The worst cases of a study, each with the command that flies it on the graph."""
 
-import os
 import shlex
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,6 +13,7 @@ from css_analysis.quantities import Summary
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import summaries_of
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
+from css_common.whole_files import write_whole
 from css_report.errors import ReportError
 from css_report.study_plots import configuration_label, values_of
 
@@ -49,9 +49,7 @@ def mission_reference(study: StudyRecord) -> str:
     file = study.folder / MISSION_FILE
     try:
         if not file.is_file() or file.read_text(encoding="utf-8") != text:
-            temporary = file.with_name(f".{file.name}.{os.getpid()}")
-            temporary.write_text(text, encoding="utf-8")
-            os.replace(temporary, file)
+            write_whole(file, text)
     except OSError as error:
         raise ReportError(f"{file}: the mission that flew cannot be written: {error.strerror}") from error
     return str(Path(file))

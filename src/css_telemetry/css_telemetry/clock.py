@@ -21,6 +21,7 @@ FAR_NS = 86_400 * 10**9
 """A step of the clock [ns] that must be confirmed, when it is also a thousand times the usual one."""
 
 _TIMES_THE_USUAL = 1000.0
+_BACKWARD = 9  # of ten steps: of lines in no order half go backward
 
 
 def consistent_lines(stamps_ns: Sequence[int] | np.ndarray) -> np.ndarray:
@@ -38,6 +39,13 @@ def consistent_lines(stamps_ns: Sequence[int] | np.ndarray) -> np.ndarray:
     if np.any(np.diff(stamps[inside]) <= 0):
         inside = _longest_growth(stamps.tolist(), inside.tolist())
     return _without_strays(stamps, inside)
+
+
+def newest_first(stamps_ns: Sequence[int] | np.ndarray) -> bool:
+    """Whether the times of a table go backward from line to line, but for a few that a clock was set by."""
+    steps = np.diff(np.asarray(stamps_ns, np.int64))
+    backward, forward = int(np.count_nonzero(steps < 0)), int(np.count_nonzero(steps > 0))
+    return backward > _BACKWARD * forward and backward >= CONFIRMED_BY
 
 
 def _fullest_window(stamps: np.ndarray) -> tuple[int, int]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from css_recording.errors import BagError
-from css_telemetry.clock import consistent_lines
+from css_telemetry.clock import consistent_lines, newest_first
 from css_telemetry.description import Description, PositionForm
 from css_telemetry.faults import Account, Broken, add
 from css_telemetry.header import column_of, long_form
@@ -28,6 +28,7 @@ class Readings:
         values: (N,) of each column that was asked for.
         ignored: columns that nobody asked for.
         account: what became of the lines.
+        newest_first: they stood in the table the other way round.
     """
 
     stamps_ns: np.ndarray
@@ -35,6 +36,7 @@ class Readings:
     values: dict[str, np.ndarray]
     ignored: tuple[str, ...]
     account: Account
+    newest_first: bool = False
 
     def matrix(self, columns: Iterable[str]) -> np.ndarray:
         """(N, M) values of some columns."""
@@ -105,13 +107,17 @@ def read_columns(table: Table, description: Description) -> Readings:
     stamps = np.concatenate([np.zeros(0, np.int64), *(part.stamps_ns for part in parts)])
     lines = np.concatenate([np.zeros(0, np.int64), *(part.lines for part in parts)])
     values = {name: np.concatenate([np.zeros(0), *(part.values[name] for part in parts)]) for name in names}
+    backward = newest_first(stamps)
+    if backward:
+        stamps, lines = stamps[::-1], lines[::-1]
+        values = {name: column[::-1] for name, column in values.items()}
     kept = _in_order(stamps, lines, account)
     if not len(kept):
         raise _nothing(table, account)
     used = set(at.values())
     ignored = tuple(name for index, name in enumerate(table.header) if index not in used and name)
     values = {name: column[kept] for name, column in values.items()}
-    readings = Readings(stamps[kept], lines[kept], values, ignored, account)
+    readings = Readings(stamps[kept], lines[kept], values, ignored, account, backward)
     for group in groups:
         _mask_fills(readings, group, description.missing)
     return readings
@@ -157,7 +163,7 @@ def _in_order(stamps: np.ndarray, lines: np.ndarray, account: Account) -> np.nda
     """Lines whose times go forward together; the others are refused."""
     kept = consistent_lines(stamps)
     lost = np.setdiff1d(np.arange(len(stamps)), kept, assume_unique=True)
-    others = f"the {len(kept)} lines that do" if len(kept) > 1 else "the other"
+    others = f"the {len(kept)} lines that do" if len(kept) > 1 else "the only line that is kept"
     for index in lost.tolist():
         fault = Broken("time does not go forward", f"column time: it does not go forward with {others}")
         account.refuse(int(lines[index]), fault)

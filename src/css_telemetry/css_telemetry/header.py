@@ -66,9 +66,13 @@ def _check_header(table: Table) -> None:
     header = table.header
     if header and all(map(is_number, header)):
         raise ValueError(f"no column time; the header is {listed(header)}; the first line must name the columns")
-    for name in header:
-        if name and header.count(name) > 1:
-            raise ValueError(f"two columns are called {name}")
+    places: dict[str, int] = {}
+    for number, name in enumerate(header, start=1):
+        if name and name in places:
+            raise ValueError(
+                f"two columns are called {name}, the {places[name]}. and the {number}., expected a name for each"
+            )
+        places[name] = number
 
 
 def completed(
@@ -198,7 +202,7 @@ def likenesses(ignored: tuple[str, ...]) -> list[str]:
     for pattern, likeness in _LIKENESSES:
         names = [name for name in ignored if pattern.fullmatch(plain_name(name_and_unit(name)[0]))]
         if names:
-            lines.append(f"{', '.join(names)} look{'s' if len(names) == 1 else ''} {likeness}")
+            lines.append(f"{listed(names)} look{'s' if len(names) == 1 else ''} {likeness}")
     return lines
 
 

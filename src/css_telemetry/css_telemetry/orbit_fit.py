@@ -8,6 +8,7 @@ import numpy as np
 
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.j2_integration import J2Track
+from css_telemetry.least_squares import levenberg_marquardt
 from css_telemetry.places import Place
 
 WORST_M = 20e3
@@ -16,9 +17,13 @@ WORST_M = 20e3
 _FIRST_SPAN_S = 3_000.0  # half of an orbit, from which on a fit is carried to longer spans
 _SPANS_GROW = 8.0
 
+_NEAR_ENOUGH, _BEST = 1e-2, 1e-6  # of sums of squares, what is left to gain: on the way to longer spans, and in the end
+_FINE_M = 0.2  # of the distance from the orbit: longer steps err by more
 _MOST_POINTS = 300
 _STEP_S = 8.0  # of integration: 5 m in a week at 400 km
-_SLOPE = 0.01  # of 1 km and 1 m/s: far above what rounding makes of a week, far below what bends
+_SLOPE = (10.0, 10.0, 10.0, 0.01, 0.01, 0.01)  # [m, m/s]: far above what rounding makes of a week, far below what bends
+_SLOPE_STEP_S = 32.0  # of integration for slopes: what longer steps err by goes out of differences
+_FARTHEST = 1e9  # [m], of a way that has left the Earth or fallen into it
 _BEGINNING_S = 120.0  # of positions by which a first velocity is found
 _LOWEST = 100e3  # altitude [m] that missions accept
 
@@ -61,9 +66,9 @@ def fit_orbit(place: Place, stamps_ns: np.ndarray) -> OrbitFit:
     while span < longest:
         near = known[elapsed[known] <= span]
         if len(near) >= 3:
-            state, _ = _improved(state, elapsed, place.r_n, near)
+            state, _ = _improved(state, elapsed, place.r_n, near, _NEAR_ENOUGH)
         span *= _SPANS_GROW
-    state, misses = _improved(state, elapsed, place.r_n, known)
+    state, misses = _improved(state, elapsed, place.r_n, known, _BEST)
     away = np.linalg.norm(misses, axis=1)
     rms, worst = float(np.sqrt(np.mean(away**2))), float(np.max(away))
     if not worst <= WORST_M:
@@ -75,28 +80,24 @@ def fit_orbit(place: Place, stamps_ns: np.ndarray) -> OrbitFit:
 
 
 def _improved(
-    start: np.ndarray, elapsed: np.ndarray, r_n: np.ndarray, rows: np.ndarray
+    start: np.ndarray, elapsed: np.ndarray, r_n: np.ndarray, rows: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """The state (6,) at time zero that fits the positions of some rows best, and how far (K, 3) [m] it misses them."""
-    from scipy.optimize import least_squares
-
     used = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_POINTS)).astype(int))]
     time, positions = elapsed[used], r_n[used]
-    scale = np.array([1e3] * 3 + [1.0] * 3)
 
-    def misses(x: np.ndarray) -> np.ndarray:
-        state = start + scale * x
-        track, _ = J2Track(state[:3], state[3:], _STEP_S).states(time)
-        miss = (track - positions) / 1e3
-        return np.where(np.isfinite(miss), np.clip(miss, -1e6, 1e6), 1e6).ravel()
+    def misses(state: np.ndarray, step_s: float) -> np.ndarray:
+        track, _ = J2Track(state[:3], state[3:], step_s).states(time)
+        miss = track - positions
+        return np.where(np.isfinite(miss), np.clip(miss, -_FARTHEST, _FARTHEST), _FARTHEST).ravel()
 
-    def slopes(x: np.ndarray) -> np.ndarray:
-        here = misses(x)
-        return np.stack([(misses(x + step) - here) / _SLOPE for step in _SLOPE * np.eye(6)], axis=1)
+    def slopes(state: np.ndarray) -> np.ndarray:
+        here = misses(state, _SLOPE_STEP_S)
+        steps = np.diag(_SLOPE)
+        return np.stack([(misses(state + step, _SLOPE_STEP_S) - here) / step.sum() for step in steps], axis=1)
 
-    # a tolerance of a metre in positions of thousands of kilometres
-    found = least_squares(misses, np.zeros(6), jac=slopes, method="trf", x_scale="jac", max_nfev=40, ftol=1e-6)
-    return start + scale * found.x, 1e3 * found.fun.reshape(-1, 3)
+    state, found = levenberg_marquardt(lambda x: misses(x, _STEP_S), slopes, start, tolerance, len(used) * _FINE_M**2)
+    return state, found.reshape(-1, 3)
 
 
 def _first_state(place: Place, elapsed: np.ndarray, known: np.ndarray) -> np.ndarray:

@@ -109,7 +109,7 @@ def _lines(
     used = {*time.form.columns, *guesses.cells, *_used(guesses)}
     unused = [name for name in table.header if name and name not in used]
     if unused:
-        yield f"# Not used: {', '.join(unused)}"
+        yield f"# Not used: {listed(unused)}"
 
 
 def _used(guesses: Guesses) -> Iterator[str]:

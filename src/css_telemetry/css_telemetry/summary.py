@@ -9,6 +9,7 @@ from css_telemetry.description import USUAL_VIEW_DEG
 from css_telemetry.faults import Counted, counted_objects
 from css_telemetry.header import likenesses
 from css_telemetry.importing import ImportReport
+from css_telemetry.table_text import listed
 from css_telemetry.true_states import ATTITUDE, ILLUMINATION, POSITION, RATE, SUN
 
 _PARTS = (SUN, ATTITUDE, RATE, POSITION, ILLUMINATION)
@@ -51,7 +52,7 @@ def summary_lines(report: ImportReport) -> Iterator[str]:
     if report.calibration is not None:
         yield f"calibration: {report.calibration}, taken off by whoever replays the recording; its cells are as read"
     if telemetry.ignored_columns:
-        yield f"columns not used: {', '.join(telemetry.ignored_columns)}"
+        yield f"columns not used: {listed(telemetry.ignored_columns)}"
         yield from (f"  {likeness}" for likeness in likenesses(telemetry.ignored_columns))
     largest = telemetry.largest_output
     if not _PLAIN_LOW <= largest <= _PLAIN_HIGH:

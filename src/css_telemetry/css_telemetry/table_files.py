@@ -46,7 +46,7 @@ def open_table(
     if kind in PARQUET:
         table = _framed(path, _parquet(path, content), 0, ["Parquet"])
     elif kind in EXCEL:
-        frame, sheet = _excel(path, content, form.sheet)
+        frame, sheet = _excel(path, content, form.sheet, names)
         table = _framed(path, frame, 1, [f"Excel, sheet {sheet}"])
     else:
         table = text_table(path, content, names, form, is_used)
@@ -65,7 +65,8 @@ def _parquet(path: Path, content: bytes) -> "pd.DataFrame":
         raise BagError(f"{path}: cannot be read as Parquet: {' '.join(str(error).split())}") from error
 
 
-def _excel(path: Path, content: bytes, sheet: str) -> tuple["pd.DataFrame", str]:
+def _excel(path: Path, content: bytes, sheet: str, names: Collection[str]) -> tuple["pd.DataFrame", str]:
+    """The sheet that is asked for, else the one whose header has the most of some names; and its name with others."""
     import io
     import zipfile
 
@@ -73,11 +74,17 @@ def _excel(path: Path, content: bytes, sheet: str) -> tuple["pd.DataFrame", str]
 
     try:
         with pd.ExcelFile(io.BytesIO(content), engine="openpyxl") as book:
-            name = sheet or str(book.sheet_names[0])
-            if name not in book.sheet_names:
-                known = ", ".join(map(str, book.sheet_names))
-                raise BagError(f"{path}: no sheet {name}, expected one of {known}")
-            return pd.read_excel(book, sheet_name=name), name
+            known = [str(name) for name in book.sheet_names]
+            if sheet and sheet not in known:
+                raise BagError(f"{path}: no sheet {sheet}, expected one of {', '.join(known)}")
+
+            def agreement(name: str) -> tuple[int, int]:
+                header = [str(column).strip() for column in pd.read_excel(book, sheet_name=name, nrows=0).columns]
+                return sum(column in names or name_and_unit(column)[0] in names for column in header), len(header)
+
+            name = sheet or (known[0] if len(known) == 1 else max(known, key=agreement))
+            others = f" of {', '.join(known)}" if not sheet and len(known) > 1 else ""
+            return pd.read_excel(book, sheet_name=name), name + others
     except (zipfile.BadZipFile, KeyError, ValueError, OSError) as error:
         raise BagError(f"{path}: cannot be read as Excel: {' '.join(str(error).split())}") from error
 

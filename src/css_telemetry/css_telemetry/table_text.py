@@ -61,7 +61,7 @@ class Table(NamedTuple):
 def listed(header: Sequence[str]) -> str:
     """Names of columns for a message, which stays a line although a file may be anything."""
     names = ", ".join(header) or "empty"
-    return names if len(names) <= _LONGEST else f"{names[:_LONGEST]} ..."
+    return names if len(names) <= _LONGEST else f"{names[:_LONGEST]} ... ({len(header)} in all)"
 
 
 def name_and_unit(column: str) -> tuple[str, str]:
@@ -92,7 +92,7 @@ def text_table(
     text, encoding = _decoded(path, content, form.encoding)
     first = list(islice(_numbered(text), _LOOKED_AT))
     if not first:
-        raise BagError(f"{path}: line 1: no column time; the header is empty")
+        raise BagError(f"{path}: line 1: nothing is there, expected the names of columns, and lines below them")
     separator = form.separator or _separator(first, names)
     header_line, header_text = first[0]
     header = _split(header_text, separator)

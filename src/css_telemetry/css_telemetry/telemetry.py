@@ -178,7 +178,12 @@ def _telemetry(
         _truth(readings, description),
         account,
         readings.ignored,
-        (*table.read_as, *notes, *(f"cell outputs in {unit}" for unit in units)),
+        (
+            *table.read_as,
+            *(["newest line first"] if readings.newest_first else []),
+            *notes,
+            *(f"cell outputs in {unit}" for unit in units),
+        ),
         full_scale is not None or description.scaled,
         sha256,
         doubt=table.doubt,

@@ -20,6 +20,7 @@ from css_recording.errors import BagError
 from css_telemetry.commands.import_csv import main
 from css_telemetry.description import CellForm, Description
 from css_telemetry.importing import examined, record
+from css_telemetry.table_text import listed
 from css_telemetry.telemetry import read_telemetry, refuse_unscaled
 
 LAYOUT = Description((CellForm("c1", "c1", (1.0, 0.0, 0.0)), CellForm("c2", "c2", (0.0, 0.6, 0.8))))
@@ -212,18 +213,42 @@ def test_what_a_bad_value_costs(tmp_path):
     [
         ("t,c1,c2", "no column time; the header is t, c1, c2"),
         ("time,c1", "no column c2, which the description names"),
-        ("time,c1,c2,c1", "two columns are called c1"),
+        ("time,c1,c2,c1", "two columns are called c1, the 2. and the 4., expected a name for each"),
         ("time,c1,c2,omega_x,omega_y,omega_z", "column omega_x: expected its unit"),
         ("time,c1,c2,omega_x_rad_s", "no column omega_y"),
         ("time,c1,c2,omega_x_rad_s,omega_y_deg_s,omega_z_rad_s", "different units"),
         ("time,c1,c2,sun_x,sun_y", "no column sun_z"),
-        ("", "no column time; the header is empty"),
+        ("", "nothing is there, expected the names of columns"),
     ],
 )
 def test_a_header_without_what_is_needed_is_refused(tmp_path, header, words):
     with pytest.raises(BagError, match="line 1") as refusal:
         read_telemetry(table(tmp_path, header + "\n"), LAYOUT)
     assert words in str(refusal.value)
+
+
+def test_lines_from_the_newest_on_are_read_from_the_oldest_on_and_said(tmp_path):
+    lines = [f"{1_370_000_000 + k},{0.01 * k},1.0" for k in range(50)]
+    forward = read_telemetry(table(tmp_path, "\n".join(["time,c1,c2", *lines])), LAYOUT)
+    backward = read_telemetry(
+        table(tmp_path, "\n".join(["time,c1,c2", *lines[:20:-1], "x,1,1", *lines[20::-1]])), LAYOUT
+    )
+    np.testing.assert_array_equal(backward.stamps_ns, forward.stamps_ns)
+    np.testing.assert_array_equal(backward.cells, forward.cells)
+    assert backward.read_as == ("newest line first",)
+    assert forward.read_as == ()
+    assert {kind: (c.times, c.first_line) for kind, c in backward.account.refused.items()} == {"no time": (1, 31)}
+
+
+def test_a_hundred_thousand_columns_are_read(tmp_path):
+    """Each name was looked for among all others, which took hours."""
+    others = [f"x{number}" for number in range(100_000)]
+    lines = [",".join(["time", "c1", "c2", *others])]
+    lines += [",".join([str(1_370_000_000 + k), "0.5", "1.0", *["1"] * len(others)]) for k in range(3)]
+    telemetry = read_telemetry(table(tmp_path, "\n".join(lines)), LAYOUT)
+    np.testing.assert_array_equal(telemetry.cells, [[0.5, 1.0]] * 3)
+    assert len(telemetry.ignored_columns) == len(others)
+    assert len(listed(telemetry.ignored_columns)) < 400 and listed(others).endswith(" ... (100000 in all)")
 
 
 def test_tables_without_telemetry_are_refused(tmp_path):

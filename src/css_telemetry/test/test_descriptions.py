@@ -151,6 +151,8 @@ def test_kinds_of_files(tmp_path, kind):
     assert telemetry.ignored_columns == ("note",)
     if kind == "xlsx":
         assert telemetry.read_as == ("Excel, sheet data",)
+        found = read_telemetry(path, description_of(CELL + "time: {column: stamp}\n"))
+        assert found.read_as == ("Excel, sheet data of cover, data",), "the one with the columns, said"
         with pytest.raises(BagError, match="no sheet moon, expected one of cover, data"):
             read_telemetry(path, description_of(CELL + "table: {sheet: moon}\n"))
 

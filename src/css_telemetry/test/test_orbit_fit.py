@@ -7,9 +7,10 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from css_common.epochs import format_utc
+from css_environment.j2_integration import STEP_S, J2Track
 from css_environment.orbit import IntegratedOrbit, keplerian_orbit, orbit_states
 from css_recording.errors import BagError
-from css_telemetry import import_table
+from css_telemetry import import_table, orbit_fit
 from css_telemetry.orbit_fit import Elements, elements_of, fit_orbit
 from css_telemetry.places import Place
 
@@ -109,3 +110,21 @@ def test_a_boot_that_nobody_dated_has_no_orbit_and_no_ephemeris(tmp_path):
     (tmp_path / "d.yaml").write_text(text + attitude)
     with pytest.raises(BagError, match=r"expected time.epoch, truth.sun or truth.sun_inertial"):
         import_table(tmp_path / "t.csv", tmp_path / "d.yaml", tmp_path / "bag2")
+
+
+def test_a_week_is_integrated_a_hundred_times_at_most(monkeypatch):
+    """Months are some sixty weeks: each was followed five hundred times, in steps as long as for the result."""
+    steps_s = []
+
+    class Counted(J2Track):
+        def __init__(self, r_n, v_n, step_s=STEP_S):
+            super().__init__(r_n, v_n, step_s)
+            steps_s.append(step_s)
+
+    monkeypatch.setattr(orbit_fit, "J2Track", Counted)
+    time = np.arange(0.0, 7.0 * 86_400.0, 600.0)
+    true, _ = orbit_states(orbit_of(Elements(550e3, 0.002, 97.5, 30.0, 80.0, -20.0)), EPOCH_NS, time)
+    fit = fit_orbit(Place(true, np.full_like(true, np.nan)), EPOCH_NS + np.round(time * 1e9).astype(np.int64))
+    assert fit.worst_m < 20.0
+    assert len(steps_s) <= 150
+    assert sum(step_s < 30.0 for step_s in steps_s) <= 40

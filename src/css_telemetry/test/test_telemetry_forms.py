@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_recording.errors import BagError
-from css_telemetry.clock import LONGEST_NS, consistent_lines
+from css_telemetry.clock import LONGEST_NS, consistent_lines, newest_first
 from css_telemetry.description import CellForm, Description
 from css_telemetry.header import likenesses
 from css_telemetry.sentinels import fill_values
@@ -194,6 +194,22 @@ def seconds(*counts):
 )
 def test_the_largest_set_of_times_that_fit_together(stamps, kept):
     assert consistent_lines(stamps).tolist() == kept
+
+
+@pytest.mark.parametrize(
+    ("stamps", "backward"),
+    [
+        (seconds(*range(120)), False),
+        (seconds(*range(119, -1, -1)), True),
+        (seconds(*range(300, 200, -1), *range(900, 800, -1)), True),  # a clock that was set
+        (seconds(*range(3600, 3620), *range(20, 120)), False),
+        (seconds(2, 1), False),  # one damaged time as well
+        (seconds(5, 5, 5, 5, 5), False),
+        (np.random.default_rng(2).permutation(120) * 10**9, False),
+    ],
+)
+def test_a_table_that_goes_backward_is_told_from_one_in_no_order(stamps, backward):
+    assert newest_first(stamps) == backward
 
 
 @settings(max_examples=300, deadline=None)

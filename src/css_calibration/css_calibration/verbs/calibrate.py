@@ -26,6 +26,7 @@ from css_calibration.step_lines import step_lines
 from css_common.command import FAILED, complain
 from css_common.mission import find_mission
 from css_common.progress_lines import still_working
+from css_common.whole_files import write_whole
 
 _CELL_HEADINGS = {
     "scale": "scale\n[-]",
@@ -52,7 +53,7 @@ def run(prog: str, options: argparse.Namespace) -> int:
             recorded, reference=options.reference, curve=options.response, holdout=options.holdout, tell=step_lines()
         )
     text = calibration_file(result, str(options.bag), options.extends)
-    file.write_text(text, encoding="utf-8")
+    write_whole(file, text)
     _print(result, Console(highlight=False, markup=False))
     print(f"calibration: {file}")
     if options.json:

@@ -7,16 +7,15 @@ left out the mean square with all less that without it. Intervals are of a boots
 """
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from css_common.mission import Mission, MissionError
-from css_common.processors import usable_processors
 from css_design.budget.sources import FILTER, LAYOUT, Source, heard_sources, is_active, seeing_everywhere, without
 from css_monte_carlo.case_tallies import SAMPLED, SUNLIT
 from css_monte_carlo.chunk import fly_cases
+from css_monte_carlo.flight_threads import FlightThreads
 from css_monte_carlo.mission_flight import MissionFlight
 
 RESAMPLES = 2000
@@ -78,19 +77,14 @@ def fly(missions: dict[str, Mission], cases: int, tell: Tell) -> dict[str, Error
     # compiled, or loaded, before threads ask for it all at once
     done, total = 0, cases * len(flights)
     results: dict[str, list[Errors]] = {name: [] for name in flights}
-    with ThreadPoolExecutor(usable_processors()) as pool:
+    with FlightThreads() as pool:
         futures = [
             (name, len(part), pool.submit(_fly, flight, part)) for name, flight in flights.items() for part in numbers
         ]
-        try:
-            for name, count, future in futures:
-                results[name].append(future.result())
-                done += count
-                tell(done, total)
-        except BaseException:
-            for *_, future in futures:
-                future.cancel()
-            raise
+        for name, count, future in futures:
+            results[name].append(future.result())
+            done += count
+            tell(done, total)
     return {name: _joined(parts) for name, parts in results.items()}
 
 

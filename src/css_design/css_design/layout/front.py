@@ -11,6 +11,7 @@ import numpy as np
 from css_common.mission import Mission, MissionError
 from css_common.preflight import preflight
 from css_common.sections import name_for_files
+from css_common.whole_files import write_whole
 from css_design.errors import DesignError
 from css_design.layout.heading_error import HeadingError
 from css_design.layout.readings import Cells
@@ -132,7 +133,7 @@ def _written(mission: Mission, folder: Path) -> str:
     file = folder / f"{mission.name}.yaml"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        file.write_text(mission.text(), encoding="utf-8")
+        write_whole(file, mission.text())
     except OSError as error:
         raise DesignError(f"{file}: cannot be written: {error.strerror}") from error
     return str(file)

@@ -4,6 +4,7 @@
 import argparse
 import json
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from css_monte_carlo.progress import progress_bar
 
 _NOMINAL, _QUICK_NOMINAL = 2, 1
 _MOST_CASES = 100_000
+_BELOW_ZERO = " below zero: with that source the mean square of the errors is less, by the square of the number"
 
 
 def run(options: argparse.Namespace) -> int:
@@ -121,6 +123,7 @@ def _print(budget: Budget, console: Console) -> None:
             soft_wrap=True,
         )
         console.print(_table(part))
+        explain_signs((number for row in part.rows for number in (row.alone.value, row.left_out.value)), console)
         console.print(
             f" {part.name}, 95 % of the errors below {_interval(part.bound)} deg"
             + (f"; predicted {part.predicted_bound:.2f}" if math.isfinite(part.predicted_bound) else ""),
@@ -132,6 +135,12 @@ def _print(budget: Budget, console: Console) -> None:
         console.print()
     for remark in budget.remarks:
         console.print(f"remark: {remark}", soft_wrap=True)
+
+
+def explain_signs(numbers: Iterable[float], console: Console) -> None:
+    """A root mean square below zero needs a word."""
+    if any(number < 0.0 for number in numbers):
+        console.print(_BELOW_ZERO, soft_wrap=True)
 
 
 def _table(part: Part) -> ReadableTable:

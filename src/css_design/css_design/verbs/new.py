@@ -4,7 +4,6 @@
 import argparse
 import json
 import math
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from css_common.sections import name_for_files
+from css_common.whole_files import write_whole
 from css_design.errors import DesignError
 from css_design.new_mission.items import ITEMS
 from css_design.new_mission.new_mission import NewMission, new_mission, read_items
@@ -78,12 +78,7 @@ def _write(path: Path, text: str, overwrite: bool) -> None:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
         return
-    temporary = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        temporary.write_text(text, encoding="utf-8")
-        temporary.replace(path)
-    finally:
-        temporary.unlink(missing_ok=True)
+    write_whole(path, text)
 
 
 def _tell(made: NewMission, path: Path) -> None:

@@ -10,6 +10,7 @@ from css_common.command import DONE, FAILED, USAGE, CommandParser, complain
 from css_common.epochs import parse_utc
 from css_common.mission import MissionError
 from css_common.progress_lines import still_working
+from css_common.whole_files import write_whole
 from css_recording.bag_folder import fresh_folder
 from css_recording.errors import BagError
 from css_telemetry.description_file import read_description
@@ -89,7 +90,7 @@ def _describe(parser: CommandParser, options: argparse.Namespace) -> int:
         complain(parser.prog, f"{target} is there; --overwrite replaces it")
         return USAGE
     try:
-        target.write_text(text, encoding="utf-8")
+        write_whole(target, text)
     except OSError as error:
         complain(parser.prog, f"{target}: cannot be written: {error.strerror}")
         return FAILED
