@@ -28,9 +28,8 @@ _SURE = 0.01  # [rad^2] along the better axis: 6 deg
 # Where one or two cells see the Sun, the direction that they do not tell has to get uncertain as fast as a body turns
 # that nothing is known of.
 _GYROLESS = {"process_sigma": 0.03}
-# A filter that follows the gyro through ten seconds before cells move it, and thinks well of cells: of those that it
-# expects the Sun on. One that is bright beside a grazed one is lit by the Earth as likely.
-_GYRO_LED = {"process_sigma": 0.0015, "cell_sigma": 0.05, "gate": 1.0}
+# A filter that follows the gyro through ten seconds before cells move it, and thinks well of cells.
+_GYRO_LED = {"process_sigma": 0.0015, "cell_sigma": 0.05}
 _MEMORY = 5.0  # [s] of which misfits are averaged
 _SETTLING = 5.0  # [s] in which a Sun that was found may still move
 _LONG = 10.0  # [s] after which a filter has shown that it fits, or not
@@ -225,9 +224,7 @@ def follow_gyro(
     misfit, since = led.misfit, led.since + dt
     squares, count = _misfit(p, cells, state, voltages)
     if heading.nis_dof > 0 and count > 0:
-        # what its covariance covers is none: it may have begun far off along what few cells do not tell
-        off = min(squares / count, heading.nis / heading.nis_dof)
-        misfit += min(dt / _MEMORY, 1.0) * (off - misfit)
+        misfit += min(dt / _MEMORY, 1.0) * (squares / count - misfit)
     # what no bad beginning explains counts at once
     gross = misfit > _GROSS * largest and since > _MEMORY
     if gross or (misfit > largest and since > _LONG):
