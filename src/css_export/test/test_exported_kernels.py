@@ -195,7 +195,8 @@ def test_no_instruction_that_rounds_otherwise_or_asks_an_operating_system(export
     library, _, _ = exported
     (tmp_path / "step.o").write_bytes(library.for_target(TARGETS[name]).object)
     shown = subprocess.run([tool, "-d", str(tmp_path / "step.o")], capture_output=True, text=True, check=True).stdout
-    instructions = [line.split("\t", 2)[-1] for line in shown.splitlines() if line.count("\t") >= 2]
+    # without the names that addresses stand for, which are made of hashes and may read like anything
+    instructions = [line.split("\t", 2)[-1].partition("<")[0] for line in shown.splitlines() if line.count("\t") >= 2]
     assert len(instructions) > 1000
     assert not [line for line in instructions if re.search(forbidden, line)]
 

@@ -8,7 +8,6 @@ import numpy as np
 
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.j2_integration import J2Track
-from css_telemetry.least_squares import levenberg_marquardt
 from css_telemetry.places import Place
 
 WORST_M = 20e3
@@ -18,7 +17,7 @@ _FIRST_SPAN_S = 3_000.0  # half of an orbit, from which on a fit is carried to l
 _SPANS_GROW = 8.0
 
 _NEAR_ENOUGH, _BEST = 1e-2, 1e-6  # of sums of squares, what is left to gain: on the way to longer spans, and in the end
-_FINE_M = 0.2  # of the distance from the orbit: longer steps err by more
+_MOST_ROUNDS = 40
 _MOST_POINTS = 300
 _STEP_S = 8.0  # of integration: 5 m in a week at 400 km
 _SLOPE = (10.0, 10.0, 10.0, 0.01, 0.01, 0.01)  # [m, m/s]: far above what rounding makes of a week, far below what bends
@@ -82,7 +81,13 @@ def fit_orbit(place: Place, stamps_ns: np.ndarray) -> OrbitFit:
 def _improved(
     start: np.ndarray, elapsed: np.ndarray, r_n: np.ndarray, rows: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The state (6,) at time zero that fits the positions of some rows best, and how far (K, 3) [m] it misses them."""
+    """The state (6,) at time zero that fits the positions of some rows best, and how far (K, 3) [m] it misses them.
+
+    By Levenberg and Marquardt, who begin with the whole step: a trust region that begins with one of a unit takes a
+    dozen rounds to reach it where the residuals are thousands of kilometres.
+    """
+    from scipy.optimize import least_squares
+
     used = rows[np.unique(np.linspace(0, len(rows) - 1, min(len(rows), _MOST_POINTS)).astype(int))]
     time, positions = elapsed[used], r_n[used]
 
@@ -96,8 +101,16 @@ def _improved(
         steps = np.diag(_SLOPE)
         return np.stack([(misses(state + step, _SLOPE_STEP_S) - here) / step.sum() for step in steps], axis=1)
 
-    state, found = levenberg_marquardt(lambda x: misses(x, _STEP_S), slopes, start, tolerance, len(used) * _FINE_M**2)
-    return state, found.reshape(-1, 3)
+    found = least_squares(
+        lambda x: misses(x, _STEP_S),
+        start,
+        jac=slopes,
+        method="lm",
+        x_scale="jac",
+        ftol=tolerance,
+        max_nfev=_MOST_ROUNDS,
+    )
+    return found.x, found.fun.reshape(-1, 3)
 
 
 def _first_state(place: Place, elapsed: np.ndarray, known: np.ndarray) -> np.ndarray:
