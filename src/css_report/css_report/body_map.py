@@ -18,6 +18,7 @@ from css_sim.cell_screen import cell_sides, screen
 
 _STEP_DEG = 1.0  # of the map of coverage
 _LEAST_WAY = np.radians(0.5)  # between points of a path that are drawn
+_SAME_COS = np.cos(np.radians(3.0))  # labels of cells that look less apart would cover one another
 _MOST_POINTS = 6000  # of a path; a longer one is drawn with wider steps
 _X = {"range": [0.0, 360.0], "tickvals": [0, 60, 120, 180, 240, 300, 360], "constrain": "domain"}
 _Y = {"range": [180.0, 0.0], "tickvals": [0, 30, 60, 90, 120, 150, 180]}
@@ -132,14 +133,32 @@ def _views(values: Values, axes: np.ndarray) -> Iterator[Trace]:
             "width": 1.6 + 0.8 * (i // len(OUTLINES)),
         }
         yield _broken(at, {"name": f"view of cell {i}", "line": stroke})
-    at = map_coordinates(axes, values.cells.normals)
+    alike = _alike(values.cells.normals)
+    at = map_coordinates(axes, np.array([values.cells.normals[cells[0]] for cells in alike]).reshape(-1, 3))
+    labels = [",".join(map(str, cells)) for cells in alike]
+    sizes = [max(19, 8 * len(label) + 6) for label in labels]
+    # a label of several cells stays inside the map, beside which the axis has its numbers
+    inside = [0.3 * size if len(cells) > 1 else 0.0 for size, cells in zip(sizes, alike, strict=True)]
+    across = np.clip(at[:, 0], inside, 360.0 - np.array(inside))
     yield {
-        "type": "scatter", "mode": "markers+text", "name": "where cells look", "x": at[:, 0].tolist(),
-        "y": at[:, 1].tolist(), "text": [f"{i}" for i in range(len(at))], "textposition": "middle center",
+        "type": "scatter", "mode": "markers+text", "name": "where cells look", "x": across.tolist(),
+        "y": at[:, 1].tolist(), "text": labels, "textposition": "middle center",
         "textfont": {"color": "#ffffff", "size": 12, "weight": 700}, "hoverinfo": "text",
-        "marker": {"symbol": "circle", "size": 19, "color": "#30363c", "line": {"color": "#ffffff", "width": 1}},
+        "marker": {"symbol": "circle", "size": sizes, "color": "#30363c", "line": {"color": "#ffffff", "width": 1}},
         "cliponaxis": False,
     }  # fmt: skip
+
+
+def _alike(normals: np.ndarray) -> list[list[int]]:
+    """Numbers of the cells that look the same way, which have one label."""
+    alike: list[list[int]] = []
+    for i, normal in enumerate(normals):
+        same = next((cells for cells in alike if np.dot(normals[cells[0]], normal) > _SAME_COS), None)
+        if same is None:
+            alike.append([i])
+        else:
+            same.append(i)
+    return alike
 
 
 def _paths(log: FlightLog, axes: np.ndarray) -> Iterator[Trace]:
