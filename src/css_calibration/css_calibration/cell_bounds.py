@@ -22,9 +22,8 @@ from css_sensors.cells import LARGEST_READING
 _ABSOLUTE, _SHARE, _EARTH, _CLOUDED = 0.08, 0.35, 0.3, 3.0  # of cells that nobody has calibrated
 _SIGMAS, _LEAST_OFF = 5.0, 0.03  # of calibrated ones
 
-_LOWEST = (
-    0.02  # share of what cells read without the Sun, below or above which it is noise that made it so little or much
-)
+# Share of what cells read without the Sun, below or above which it is noise that made it so little or much.
+_LOWEST = 0.02
 
 Bounds = tuple[np.ndarray, np.ndarray, np.ndarray]
 """What is expected (M, N), the least and the most."""

@@ -39,17 +39,19 @@ from css_estimation.sun.sun_tracking import (
     turned_sun,
     watch_light,
 )
+from css_estimation.sun.sunline_cycle import (
+    MODE_COASTING,
+    MODE_PROPAGATING,
+    MODE_STARTED,
+    MODE_TRACKING,
+    MODE_WAITING,
+)
 from css_estimation.sun.sunline_filter import constrain
 from css_estimation.sun.unscented import POINTS, STATES, PointParameters, UnscentedMemory
 from css_estimation.sun.wavg import weighted_average
 from css_estimation.symmetric import Symmetric, row_major, trace
 
-MODE_WAITING = 0
-MODE_STARTED = 1
-MODE_TRACKING = 2
-MODE_PROPAGATING = 3
-MODE_COASTING = 4
-MODE_LOST = 5
+MODE_LOST = 5  # beside those of `sunline_cycle`
 
 # A light shorter or longer by this factor than the normal Sun's is none.
 _LIGHT_RANGE = 10.0
