@@ -97,6 +97,12 @@ def row_major(p: Symmetric) -> tuple[float, float, float, float, float, float, f
 
 
 @kernel
+def of_row_major(p: tuple[float, float, float, float, float, float, float, float, float]) -> Symmetric:
+    """Of all nine elements."""
+    return (p[0], p[1], p[2], p[4], p[5], p[8])
+
+
+@kernel
 def _rotation(pp: float, qq: float, pq: float) -> tuple[float, float, float]:
     """Tangent, cosine and sine of the smaller rotation that makes the off-diagonal element pq zero."""
     if pq == 0.0:

@@ -39,6 +39,43 @@ def test_a_cell_that_faces_the_sun_shows_it_by_its_curvature_alone():
     assert error_matrix(p, (0.0, 0.0, 1.0), 1 << 4) == pytest.approx(np.diag([theta2, theta2, 0.0]), abs=1e-15)
 
 
+def with_chord(expected, normals, sun_b, e2):
+    """The same with the error on the way to the span of the cells, where they leave something open."""
+    if not len(normals):
+        return expected
+    values, vectors = np.linalg.eigh(normals.T @ normals)
+    inside = vectors[:, values >= 1e-2 * values[-1]]
+    top = inside @ inside.T @ sun_b
+    top /= np.linalg.norm(top)
+    way = top - (top @ sun_b) * sun_b
+    if inside.shape[1] == 3 or np.linalg.norm(way) < 1e-6:
+        return expected
+    way /= np.linalg.norm(way)
+    change = np.sum((normals @ (top - sun_b)) ** 2)
+    variance = np.arccos(min(1.0, top @ sun_b)) ** 2 / max(1.0, change / e2)
+    return expected + max(0.0, variance - way @ expected @ way) * np.outer(way, way)
+
+
+@pytest.mark.parametrize("off_deg", [2.0, 10.0, 18.0, 25.0, 40.0])
+def test_light_of_three_error_bars_moves_the_sun_no_further_than_three_of_its_own(off_deg):
+    """Of two cells, towards the plane in which they are: there the slope of their outputs ends."""
+    p = parameters("six faces")
+    sigma = math.sqrt(p.earth.unknown_heading)
+    between, beside = np.array([1.0, 1.0, 0.0]) / math.sqrt(2.0), np.array([0.0, 0.0, 1.0])
+
+    def sun_at(angle):
+        return math.cos(angle) * between + math.sin(angle) * beside
+
+    off, used = math.radians(off_deg), 0b11
+    sun_b = sun_at(off)
+    normals = np.column_stack([p.cells[name] for name in ("nx", "ny", "nz")])[[0, 1]]
+    along = math.cos(off) * beside - math.sin(off) * between
+    bar = math.sqrt(along @ error_matrix(p, tuple(sun_b), used) @ along)
+    for angle in np.linspace(0.0, off, 200):
+        if np.linalg.norm(normals @ (sun_at(angle) - sun_b)) <= 3.0 * sigma:
+            assert off - angle <= 3.0 * bar * (1.0 + 1e-9)
+
+
 @pytest.mark.parametrize("layout", LAYOUTS)
 def test_it_is_the_inverse_of_what_cells_in_use_show(layout):
     p = parameters(layout)
@@ -53,8 +90,10 @@ def test_it_is_the_inverse_of_what_cells_in_use_show(layout):
             across = np.eye(3) - np.outer(sun_b, sun_b)
             slopes = normals[seen] @ across
             shown = slopes.T @ slopes
-            shown = shown / max(1.0, np.trace(shown) / 2.0) + e2 / (2.0 * p.earth.unknown) * across
-            assert error_matrix(p, tuple(sun_b), used) == pytest.approx(e2 * np.linalg.pinv(shown), abs=1e-12)
+            alike = max(1.0, np.trace(shown) / 2.0)
+            expected = e2 * np.linalg.pinv(shown / alike + e2 / (2.0 * p.earth.unknown) * across)
+            expected = with_chord(expected, normals[seen], sun_b, alike * e2)
+            assert error_matrix(p, tuple(sun_b), used) == pytest.approx(expected, abs=1e-12)
 
 
 def test_without_light_of_the_earth_there_is_none_of_it():

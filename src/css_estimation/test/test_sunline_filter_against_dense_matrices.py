@@ -160,7 +160,7 @@ def test_cells_used_are_the_predicted_and_the_bright_ones(outputs, cells, narrow
     voltages = np.array(outputs)
     prior = (0.01, 0.0, 0.0, 0.01, 0.0, 0.01)
     s, cov, nis, count, mask = update_cells(
-        p.layout, p.gate, p.cell_variance, beyond_edge, predicted_b, prior, voltages, 0
+        p.layout, p.gate, p.cell_variance, beyond_edge, 0.0, predicted_b, prior, voltages, 0
     )
     assert mask == cells
     assert count == cells.bit_count()

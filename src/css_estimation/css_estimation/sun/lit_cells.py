@@ -37,11 +37,16 @@ DIM_CELLS = flag(
 )
 
 
-def dimmest_output(values: Values) -> float:
+def output_at_the_edge(values: Values) -> float:
     """Output at the edge of view, as a share of the brightest; infinite where no cell below a gate sees the Sun."""
     edge = _AT_THE_EDGE * max(0.0, half_view_cosine(values))
     # rounding must not make a view of 120 deg a wider one
-    return edge if values[DIM_CELLS] and edge < _ENDS_AT - 1e-9 else math.inf
+    return edge if edge < _ENDS_AT - 1e-9 else math.inf
+
+
+def dimmest_output(values: Values) -> float:
+    """The same where cells below a gate may count at all."""
+    return output_at_the_edge(values) if values[DIM_CELLS] else math.inf
 
 
 class Gate(NamedTuple):
@@ -60,6 +65,11 @@ class Gate(NamedTuple):
         real("minimum_output", 0.1, "-", "no Sun unless a cell is above it", low=0.0, high=1.0, tunable=True)
     )
     dimmest: float = computed(dimmest_output, DIM_CELLS)  # as `level`, of a cell at the edge of its view
+
+
+def gate_of_views(minimum_output: float, values: Values) -> Gate:
+    """The gate that follows from the cells' views, with all defaults."""
+    return Gate(True, _ENDS_AT, minimum_output, output_at_the_edge(values))
 
 
 @kernel

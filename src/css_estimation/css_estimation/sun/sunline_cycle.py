@@ -19,7 +19,8 @@ finds the Sun from anywhere; once converged it is consistent on the two axes tha
 
 Darkness. Without light, and with that of a Sun that sets (`fading`), the filter only propagates. Without gyro too,
 nothing is known about the motion: a larger process noise says so, and a state less certain than a fresh one is replaced
-at the next light.
+at the next light. To `ekf` the same goes for a motion that is known from estimates alone whose cells do not span space:
+what these leave open was made up by the estimate.
 
 The filter follows one Sun. `ekf` (`sunline_ekf`) knows of another one that explains its cells as well; what watches the
 gyro (`health.gyroless_sight`) flies the filter as it stands here.
@@ -38,7 +39,8 @@ from css_estimation.sun import sun_tracking
 from css_estimation.sun.cell_layout import CellLayout, brightest, cell_layout
 from css_estimation.sun.eclipse_detector import detect_eclipse
 from css_estimation.sun.fading import KNOWN_TURN, LightNow, cells_that_see, light_on, tells_light
-from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output
+from css_estimation.sun.left_open import surely_spans_space
+from css_estimation.sun.lit_cells import CELL_SIGMA, DIM_CELLS, Gate, dimmest_output, lit_cells
 from css_estimation.sun.snapshot import MODE_NO_SUN
 from css_estimation.sun.sun_heading import NO_COVARIANCE, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import (
@@ -138,6 +140,12 @@ def initial_state(p: SunlineParameters) -> SunlineState:
 
 
 @kernel
+def _shows_motion(p: SunlineParameters, voltages, top: int) -> bool:
+    """Whether lit cells show how the Sun moves: where they do not span space successive estimates are no rate."""
+    return surely_spans_space(p.layout.cells, lit_cells(p.layout, p.gate, voltages, top)[1])
+
+
+@kernel
 def filter_cycle(
     p: SunlineParameters, state: SunlineState, dt: float, voltages, aiding: Aiding, beyond_edge: bool
 ) -> Outcome:
@@ -160,7 +168,8 @@ def filter_cycle(
     rate_known = gyro_ok or tracking.rate_source != RATE_NONE
     if started:
         rate = aiding.gyro_b if gyro_ok and not p.propagate_filtered else tracking.omega_bn_b
-        noise = p.process_noise if rate_known else p.process_noise_without_rate
+        shown = rate_known and (gyro_ok or not (beyond_edge and lit) or _shows_motion(p, voltages, top))
+        noise = p.process_noise if shown else p.process_noise_without_rate
         sun_b, covariance = propagate(sun_b, covariance, rate, dt, noise)
 
     sure = started and tells_light(tracking.light, trace(covariance))
@@ -185,7 +194,7 @@ def filter_cycle(
     predicted_b = sun_b
     if lit and started:
         sun_b, covariance, nis, count, mask = update_cells(
-            p.layout, p.gate, p.cell_variance, beyond_edge, sun_b, covariance, voltages, top
+            p.layout, p.gate, p.cell_variance, beyond_edge, 0.0, sun_b, covariance, voltages, top
         )
     if started:
         sun_b, covariance = constrain(sun_b, predicted_b, covariance, p.largest_variance)

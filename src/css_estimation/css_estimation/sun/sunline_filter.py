@@ -8,7 +8,7 @@ sequence equal the stacked one of the paper, without a matrix inverse.
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, dot, multiply, norm, scale
-from css_estimation.sun.cell_layout import CellLayout, half_view_of, informs, missing_cells, view_margin
+from css_estimation.sun.cell_layout import CellLayout, cosine_on, half_view_of, informs, missing_cells, view_margin
 from css_estimation.sun.left_open import surely_spans_space
 from css_estimation.sun.lit_cells import Gate, lit_cells
 from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, subtract_pair, trace
@@ -54,6 +54,7 @@ def update_cells(
     gate: Gate,
     cell_variance: float,
     beyond_edge: bool,
+    doubt: float,
     sun_b: Vec3,
     covariance: Symmetric,
     voltages,
@@ -65,6 +66,8 @@ def update_cells(
         beyond_edge: where the lit cells do not span space, a dark one says that the Sun's cosine is below that at the
             edge of its view, or as far below zero: with a narrow view that is a variance beside that of the cell. Else
             it is zero, as for the paper's filter: what lit cells show, dark ones hold against the light of the Earth.
+        doubt: of the Sun's cosine on a cell [-]: of a dark one that has it in view by less nothing is taken, with
+            `beyond_edge`.
         top: result of `brightest`, which sees the Sun.
 
     Returns:
@@ -89,6 +92,8 @@ def update_cells(
             edge = half_view_of(layout, i)
             # nearer to dark than to the least that it reads of a Sun in its view
             if v < 0.5 * edge and lit_mask >> i & 1 == 0:
+                if cosine_on(layout, i, predicted_b) < edge + doubt:
+                    continue
                 variance += edge * edge / 3.0
         normal_b = (cells[i].nx, cells[i].ny, cells[i].nz)
         sun_b, covariance, q = update_cell(sun_b, covariance, normal_b, v, variance)

@@ -57,9 +57,20 @@ class CellReading(NamedTuple):
     contrary: int  # cells that are lit or dark where the estimate has it the other way round
     likelihood: float  # logarithm, but for a constant
     sigma: float  # [rad] error of the heading before, mean of two axes
+    against: float  # as `nis`, of the cells that were refused
 
 
-NOTHING_READ = CellReading(0.0, 0, 0, 0, 0, 0.0, 9.0)
+NOTHING_READ = CellReading(0.0, 0, 0, 0, 0, 0.0, 9.0, 0.0)
+
+
+@kernel
+def bit_count(mask: int) -> int:
+    """Bits that are set."""
+    count = 0
+    while mask:
+        mask &= mask - 1
+        count += 1
+    return count
 
 
 @kernel
@@ -106,7 +117,7 @@ def read_cells(
     gained, correction = m.work[0], m.work[1]
     for j in range(states):
         correction[j] = 0.0
-    nis, likelihood = 0.0, 0.0
+    nis, likelihood, against = 0.0, 0.0, 0.0
     dof, used, refused, contrary = 0, 0, 0, 0
     for i in range(cells):
         # a NaN compares false
@@ -130,6 +141,7 @@ def read_cells(
         likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(variance))
         if squared > p.convergence.gate and sigma < _CONVERGED:
             refused |= 1 << i
+            against += squared
             if abs(v - c.expected) > p.earth.largest * flux:
                 contrary += 1
             continue
@@ -138,7 +150,7 @@ def read_cells(
         used |= 1 << i
         absorb(gained, innovation, variance, corrected, states, correction, covariance)
     correct(p, x, correction, states)
-    return CellReading(nis, dof, used, refused, contrary, likelihood, sigma)
+    return CellReading(nis, dof, used, refused, contrary, likelihood, sigma, against)
 
 
 @kernel

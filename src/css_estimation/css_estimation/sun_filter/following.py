@@ -128,5 +128,7 @@ def track_cycle(
         use_field = True
     if use or use_field:
         best, left = give_up(memory)
-    progress, mode = progress_after(p, before, memory, best, left, cycle, use, faded, reading, voltages, aiding)
+    progress, mode = progress_after(
+        p, before, memory, best, left, cycle, use, faded, reading, state.two.other.apart, voltages, aiding
+    )
     return progress, filtered_rate(p, state.rate, cycle, raw_b), reading, mode

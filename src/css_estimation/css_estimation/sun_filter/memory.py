@@ -51,6 +51,7 @@ class SunFilterMemory(NamedTuple):
     earth_slopes: np.ndarray  # (N, 3) its derivatives to a turn of the body [1/rad]
     earth_work: np.ndarray  # (224,) of `css_environment.albedo.new_workspace`
     work: np.ndarray  # (3, 9 + 2 N + C)
+    sunlight: np.ndarray  # (N,) of this cycle, on each cell [-]
 
 
 def new_memory(cells: int, calibrated: int = 0) -> SunFilterMemory:
@@ -67,6 +68,7 @@ def new_memory(cells: int, calibrated: int = 0) -> SunFilterMemory:
         np.zeros((cells, 3)),
         new_workspace(),
         np.zeros((3, states)),
+        np.zeros(cells),
     )
 
 

@@ -14,8 +14,10 @@ from css_common.sections import WHEEL_INERTIA, of_each_wheel
 from css_common.vectors import Mat3, mat3
 from css_environment.albedo import Screen, plane_screen, with_views
 from css_estimation.sun import flight_sky
+from css_estimation.sun.cell_layout import CellLayout, cell_layout
 from css_estimation.sun.eclipse_detector import EclipseParameters
 from css_estimation.sun.flight_sky import USE_FIELD
+from css_estimation.sun.lit_cells import Gate, gate_of_views
 from css_estimation.sun.sun_tracking import GYRO_LIMIT, RATE_CUTOFF, USE_GYRO
 from css_estimation.sun_filter import calibration_options
 from css_estimation.sun_filter.calibration_options import Calibration, lasting_error
@@ -50,6 +52,8 @@ CURVE = choice(
 )
 TABLE = reals("response.table", (), "-", "outputs at light 0, ..., 1 in equal steps, for the curve `table`")
 
+MINIMUM_OUTPUT = real("minimum_output", 0.3, "-", "no Sun unless a cell is above it", low=0.01, high=1.0)
+
 USE_WHEELS = flag("use_wheels", True, "without gyro, take the rate from angular momentum and wheel speeds")
 
 
@@ -64,6 +68,18 @@ def _cells(values: Values) -> np.ndarray:
     cells["gain"] = values[GAINS] if len(values[GAINS]) else 1.0
     cells["dark"] = values[DARKS] if len(values[DARKS]) else 0.0
     return cells
+
+
+def _layout(values: Values) -> CellLayout:
+    """The same cells, with the normals that were measured."""
+    layout, cells = cell_layout(values), _cells(values)
+    for name in ("nx", "ny", "nz"):
+        layout.cells[name] = cells[name]
+    return layout
+
+
+def _gate(values: Values) -> Gate:
+    return gate_of_views(values[MINIMUM_OUTPUT], values)
 
 
 def _screen(values: Values) -> Screen:
@@ -272,9 +288,7 @@ class Field(NamedTuple):
 class Convergence(NamedTuple):
     """When which step of finding Sun and roll is taken."""
 
-    minimum_output: float = given(
-        real("minimum_output", 0.3, "-", "no Sun unless a cell is above it", low=0.01, high=1.0)
-    )
+    minimum_output: float = given(MINIMUM_OUTPUT)
     search_variance: float = made(
         lambda degrees: math.radians(degrees) ** 2,
         real(
@@ -309,6 +323,8 @@ class SunFilterParameters(NamedTuple):
     cells: np.ndarray = computed(_cells, GAINS, DARKS, NORMALS)
     screen: Screen = computed(_screen)
     cos_half_view: float = computed(half_view_cosine)
+    layout: CellLayout = computed(_layout, NORMALS)
+    gate: Gate = computed(_gate)
     response: Response = part(Response)
     errors: CellErrors = part(CellErrors)
     calibration: Calibration = part(Calibration)

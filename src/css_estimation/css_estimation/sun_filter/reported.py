@@ -15,12 +15,27 @@ import math
 
 from css_common.kernel import kernel
 from css_common.matrices import skew
-from css_common.vectors import Vec3, add, matmul, multiply, scale, subtract, transpose, unit
+from css_common.vectors import (
+    Vec3,
+    add,
+    angle_between,
+    dot,
+    matmul,
+    multiply,
+    norm,
+    scale,
+    subtract,
+    transpose,
+    unit,
+)
+from css_estimation.sun.left_open import mirrored, span_of, surely_spans_space
 from css_estimation.sun.sun_heading import Covariance
 from css_estimation.sun_filter.cell_model import view_of
 from css_estimation.sun_filter.memory import DEAD, HYPOTHESES, SunFilterMemory, attitude_block, dcm_of
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.symmetric import add_outer, isotropic, scaled, trace
+from css_estimation.symmetric import Symmetric, add_outer, isotropic, product, row_major, scaled, trace
+
+_NO_DIRECTION = 1e-6
 
 LARGEST = 4.0
 """Reported variance [rad2] of a heading of which nothing is known."""
@@ -47,13 +62,15 @@ def by_unknown_earth(p: SunFilterParameters, sun_b: Vec3, used: int) -> Covarian
     e2 = p.earth.unknown_heading
     if e2 == 0.0:
         return across(sun_b, 0.0)
-    slopes = isotropic(0.0)
+    slopes, seeing = isotropic(0.0), 0
     for i in range(p.cells.shape[0]):
         cosine, seen, _ = view_of(p, i, sun_b, 0.0)
         if seen and cosine > 0.0 and (used == 0 or used >> i & 1):
             cell = p.cells[i]
+            seeing |= 1 << i
             slopes = add_outer(slopes, 1.0, subtract((cell.nx, cell.ny, cell.nz), scale(cosine, sun_b)))
-    slopes = scaled(slopes, 1.0 / max(1.0, 0.5 * trace(slopes)))
+    alike = max(1.0, 0.5 * trace(slopes))
+    slopes = scaled(slopes, 1.0 / alike)
     least = e2 / (2.0 * p.earth.unknown) if p.earth.unknown > 0.0 else 0.0
     xx, xy, xz, yy, yz, zz = slopes
     total = trace(slopes)
@@ -64,11 +81,44 @@ def by_unknown_earth(p: SunFilterParameters, sun_b: Vec3, used: int) -> Covarian
     if not determinant > 0.0:
         return across(sun_b, LARGEST)
     k, rest = e2 / determinant, across(sun_b, total + least)
-    return (
-        k * (rest[0] - xx), k * (rest[1] - xy), k * (rest[2] - xz),
-        k * (rest[3] - xy), k * (rest[4] - yy), k * (rest[5] - yz),
-        k * (rest[6] - xz), k * (rest[7] - yz), k * (rest[8] - zz),
+    tangent = (
+        k * (rest[0] - xx), k * (rest[1] - xy), k * (rest[2] - xz), k * (rest[4] - yy), k * (rest[5] - yz),
+        k * (rest[8] - zz),
     )  # fmt: skip
+    return row_major(_to_the_span(p, sun_b, seeing, alike * e2, tangent))
+
+
+@kernel
+def _to_the_span(p: SunFilterParameters, sun_b: Vec3, seeing: int, e2: float, tangent: Symmetric) -> Symmetric:
+    """Covariance across the Sun line with the error on the way to the span of the cells, if they do not span space.
+
+    In the span their outputs are largest, and on the way there they have ever less of a slope: light that lasts makes
+    more of an error to that side than the slope at the heading tells. Taken is that of the chord.
+
+    Args:
+        seeing: mask of the cells.
+        e2: variance of the light on all cells together [-].
+        tangent: covariance by the slopes.
+    """
+    if seeing == 0 or surely_spans_space(p.cells, seeing):
+        return tangent
+    span = span_of(p.cells, seeing)
+    top_b = add(sun_b, mirrored(span, sun_b))
+    if span.rank == 3 or norm(top_b) < _NO_DIRECTION:
+        return tangent
+    top_b = unit(top_b)
+    way = subtract(top_b, scale(dot(top_b, sun_b), sun_b))
+    length, angle = norm(way), angle_between(top_b, sun_b)
+    if length < _NO_DIRECTION:
+        return tangent
+    change = 0.0
+    for i in range(p.cells.shape[0]):
+        if seeing >> i & 1:
+            cell = p.cells[i]
+            change += dot((cell.nx, cell.ny, cell.nz), subtract(top_b, sun_b)) ** 2
+    direction = scale(1.0 / length, way)
+    lacking = angle * angle / max(1.0, change / e2) - dot(direction, product(tangent, direction))
+    return add_outer(tangent, max(0.0, lacking), direction)
 
 
 @kernel

@@ -4,7 +4,7 @@
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, multiply
 from css_estimation.sun.sun_heading import Aiding
-from css_estimation.sun_filter.cell_update import CellReading, heading_sigma
+from css_estimation.sun_filter.cell_update import CellReading, bit_count, heading_sigma
 from css_estimation.sun_filter.field_update import field_usable
 from css_estimation.sun_filter.filter_state import (
     AFRESH,
@@ -33,16 +33,6 @@ CONVERGED = 0.1  # [rad] error of the heading below which outputs can be told to
 
 
 @kernel
-def bit_count(mask: int) -> int:
-    """Bits that are set."""
-    count = 0
-    while mask:
-        mask &= mask - 1
-        count += 1
-    return count
-
-
-@kernel
 def _lost(p: SunFilterParameters, contrary: float, sigma: float, x, sun_n: Vec3, flux: float, voltages) -> bool:
     """Whether an estimate has to be dropped."""
     if not sigma < _LOST:
@@ -64,10 +54,15 @@ def progress_after(
     use: bool,
     faded: float,
     reading: CellReading,
+    ambiguous: bool,
     voltages,
     aiding: Aiding,
 ) -> tuple[Progress, int]:
-    """Which stage comes next, and the mode of this cycle."""
+    """Which stage comes next, and the mode of this cycle.
+
+    Args:
+        ambiguous: another Sun explains the outputs as well, and is followed beside this one.
+    """
     stage, since, contrary = before.stage, before.since, before.contrary
     x, covariance = memory.estimates[best], memory.covariances[best]
     sun_n = aiding.sky.sun_n
@@ -77,7 +72,7 @@ def progress_after(
         since += cycle.dt
         mode = MODE_EARTH if left == 1 else MODE_ROLLS
         if stage == STAGE_HEADING:
-            mode = MODE_CONVERGING if aiding.sky.known or sigma > CONVERGED else MODE_NO_EARTH
+            mode = MODE_CONVERGING if aiding.sky.known or ambiguous or sigma > CONVERGED else MODE_NO_EARTH
         refused = bit_count(reading.refused)
         if refused + reading.nis_dof > 0:
             share = 1.0 if reading.contrary > 0 else refused / (refused + reading.nis_dof)
@@ -89,7 +84,9 @@ def progress_after(
     # the field tells the turn at once, whatever the Earth
     told = field_usable(p, aiding)
     enough = p.convergence.search_variance if told else p.convergence.roll_variance
-    converged = stage == STAGE_HEADING and (told or since > _SHORTEST_CONVERGENCE) and sigma * sigma < enough
+    converged = (
+        stage == STAGE_HEADING and (told or since > _SHORTEST_CONVERGENCE) and sigma * sigma < enough and not ambiguous
+    )
     if use and aiding.sky.known and converged:
         look_for_roll(p, memory, sun_n)
         stage, since = STAGE_ROLL, 0.0

@@ -6,10 +6,11 @@ heading is the Sun's known direction in n, seen from that attitude; without an o
 own. What the cells say is in `cell_update`, how the body turns in `motion`.
 
 Modes: 0 waiting for light, 1 looking for the Sun over the whole sphere (`sun_search`), 2 converging, the Earth being
-unknown, 3 following several turns about the Sun line (`hypotheses`), 4 tracking with the Earth's light predicted,
-5 tracking without, 6 no use made of the cells: dark, penumbra, or outputs that fade together; the state goes on by its
-rate. An estimate that can be no longer trusted (most outputs refused, and another direction explains them better; an
-error larger than a radian; a step longer than `longest_step`) is dropped and the Sun looked for anew.
+unknown, or another Sun possible (`second_sun`), 3 following several turns about the Sun line (`hypotheses`), 4 tracking
+with the Earth's light predicted, 5 tracking without, 6 no use made of the cells: dark, penumbra, or outputs that fade
+together; the state goes on by its rate. An estimate that can be no longer trusted (most outputs refused, and another
+direction explains them better; an error larger than a radian; a step longer than `longest_step`) is dropped and the Sun
+looked for anew.
 
 The covariance is that of the filter, and while the Earth is unknown of its light too, which lasts too long to be noise
 (`reported`).
@@ -48,12 +49,15 @@ from css_estimation.sun_filter.filter_state import (
     MODE_WAITING,
     NO_RATE,
     NOT_FOUND,
+    STAGE_HEADING,
     STAGE_ROLL,
     STAGE_SEARCH,
     Cycle,
     Found,
+    Progress,
     Rate,
     SunFilterState,
+    no_second_sun,
 )
 from css_estimation.sun_filter.following import track_cycle
 from css_estimation.sun_filter.memory import (
@@ -72,6 +76,7 @@ from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.reported import LARGEST, across, mean_variance
 from css_estimation.sun_filter.reported import heading as heading_of
 from css_estimation.sun_filter.searching import search_cycle
+from css_estimation.sun_filter.second_sun import look_beside
 
 _FULL_DISC = 0.99
 _SLOWEST_GAIN = 0.05
@@ -169,16 +174,18 @@ def step(
     eclipse_state, eclipse = detect_eclipse(p.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
     wheels_b, wheels_ok = wheel_momentum(p.motion, aiding)
     cycle = Cycle(dt, flux, lit, rate_model(p.motion, gyro_usable(p.motion, aiding), wheels_ok), wheels_b)
-    reading, found = NOTHING_READ, state.found
+    reading, found, two = NOTHING_READ, state.found, no_second_sun()
     if state.progress.stage == STAGE_SEARCH or dt > p.convergence.longest_step:
         if state.progress.stage != STAGE_SEARCH:
-            state = SunFilterState(AFRESH, state.rate, NOT_FOUND, state.validity, state.age, state.eclipse)
+            state = SunFilterState(
+                AFRESH, state.rate, NOT_FOUND, state.validity, state.age, state.eclipse, no_second_sun()
+            )
             outlast_estimate(p.calibration, p.cells.shape[0], memory, True)
         progress, rate, found = search_cycle(p, state, memory, cycle, voltages, aiding)
         sun_b, covariance = found.sun_b, across(found.sun_b, min(found.variance, LARGEST))
         mode, used = MODE_SEARCHING if progress.begun else MODE_WAITING, lit
         if lit:
-            reading = CellReading(0.0, 0, _readable(voltages), 0, 0, 0.0, 0.0)
+            reading = CellReading(0.0, 0, _readable(voltages), 0, 0, 0.0, 0.0, 0.0)
         rate_source = RATE_GYRO if cycle.model == RATE_BY_GYRO else RATE_NONE
     else:
         progress, rate, reading, mode = track_cycle(p, state, memory, cycle, voltages, aiding)
@@ -189,8 +196,14 @@ def step(
             progress, rate = AFRESH, Rate(rate.model, NO_RATE, NO_RATE)
             reading, mode = NOTHING_READ, MODE_COASTING
             sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
+        elif progress.stage == STAGE_HEADING:
+            beside = look_beside(p, state, memory, sun_b, covariance, reading, cycle, voltages, aiding)
+            two, sun_b, covariance = beside.two, beside.sun_b, beside.covariance
+            if beside.taken:
+                progress = Progress(STAGE_HEADING, True, 0.0, 0.0, 0.0)
         if progress.stage == STAGE_SEARCH:
             outlast_estimate(p.calibration, p.cells.shape[0], memory, False)
+            covariance = across(sun_b, LARGEST)
         used = reading.nis_dof > 0
         rate_source = RATE_SUN
         if cycle.model == RATE_BY_GYRO:
@@ -221,4 +234,4 @@ def step(
         isolated=0,
         sensors_left=0,
     )
-    return SunFilterState(progress, rate, found, validity, age, eclipse_state), heading
+    return SunFilterState(progress, rate, found, validity, age, eclipse_state, two), heading

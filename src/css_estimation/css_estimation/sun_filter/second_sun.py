@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The Sun filter beside the other Sun that its cells leave, for as long as it does not know the Earth.
+
+The other one is followed as `ekf` does it (`sun.other_sun`), beside the heading with its error as it is reported.
+While the two are apart the turn about the Sun line is not looked for, which might be the wrong one. If the other one
+turns out to be right the filter begins anew from there.
+
+What decides has to be fair: the filter holds on to its estimate, and whatever the model has wrong it explains worse
+than a Sun that follows the outputs. Compared with the other Sun is therefore what following makes of the estimate.
+"""
+
+from typing import NamedTuple
+
+from css_common.kernel import kernel
+from css_common.vectors import Vec3
+from css_estimation.sun.cell_layout import brightest
+from css_estimation.sun.left_open import surely_spans_space
+from css_estimation.sun.other_sun import Followed, follow, follow_other, with_other
+from css_estimation.sun.sun_heading import Aiding, Covariance
+from css_estimation.sun_filter.cell_update import CellReading, bit_count
+from css_estimation.sun_filter.filter_state import NO_RATE, Cycle, SunFilterState, TwoSuns, no_second_sun
+from css_estimation.sun_filter.hypotheses import begin
+from css_estimation.sun_filter.memory import SunFilterMemory
+from css_estimation.sun_filter.motion import RATE_BY_GYRO
+from css_estimation.sun_filter.options import SunFilterParameters
+from css_estimation.sun_filter.reported import LARGEST
+from css_estimation.sun_filter.reported import heading as heading_of
+from css_estimation.symmetric import of_row_major, row_major, scaled, trace
+
+_LEAST_GAIN = 0.2
+# [rad2/s] How fast the other Sun drifts where a gyro tells how the body turns, and where its own motion would have to.
+_DRIFT, _DRIFT_WITHOUT_RATE = 0.01**2, 0.1**2
+
+
+class Beside(NamedTuple):
+    """What a cycle comes to."""
+
+    two: TwoSuns
+    taken: bool  # the filter has begun anew, from the other Sun
+    sun_b: Vec3
+    covariance: Covariance  # to report
+
+
+@kernel
+def _write_sunlight(p: SunFilterParameters, voltages, sunlight) -> None:
+    """Outputs less the mean light of an unknown Earth, 1 being the Sun at normal incidence."""
+    for i in range(voltages.shape[0]):
+        cell = p.cells[i]
+        light = (voltages[i] - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
+        sunlight[i] = light - 0.5 * p.earth.unknown
+
+
+@kernel
+def _turning(state: SunFilterState, cycle: Cycle, reading: CellReading, aiding: Aiding) -> tuple[Vec3, float]:
+    """Rate [rad/s] at which both Suns are taken to turn in b, and how fast they drift off that [rad2/s]."""
+    if cycle.model == RATE_BY_GYRO:
+        return aiding.gyro_b, _DRIFT
+    # without gyro the rate is that of the estimate: in the light of the other Sun the body turns otherwise
+    if reading.used == 0:
+        return state.rate.omega_bn_b, _DRIFT
+    return NO_RATE, _DRIFT_WITHOUT_RATE
+
+
+@kernel
+def _misfit(p: SunFilterParameters, reading: CellReading) -> float:
+    """Factor by which innovations are larger than the filter expects, squared; 1 at least.
+
+    A cell that is refused is wrong if the others agree on a direction. If they leave one open the estimate may be.
+    """
+    squares, count = reading.nis, reading.nis_dof
+    if not surely_spans_space(p.cells, reading.used):
+        squares, count = squares + reading.against, count + bit_count(reading.refused)
+    return max(1.0, squares / max(1, count))
+
+
+@kernel
+def look_beside(
+    p: SunFilterParameters,
+    state: SunFilterState,
+    m: SunFilterMemory,
+    sun_b: Vec3,
+    covariance: Covariance,
+    reading: CellReading,
+    cycle: Cycle,
+    voltages,
+    aiding: Aiding,
+) -> Beside:
+    """Heading and covariance of a cycle beside the other Sun, and that one after it.
+
+    Args:
+        state: after the cycle before.
+        sun_b, covariance: of the filter, with the error that the Earth makes.
+        reading: of this cycle.
+    """
+    own = scaled(of_row_major(covariance), _misfit(p, reading))
+    _write_sunlight(p, voltages, m.sunlight)
+    top, dt = brightest(m.sunlight), cycle.dt
+    rate_b, drift = _turning(state, cycle, reading, aiding)
+    variance = p.errors.noise + p.errors.scale + p.errors.cell + p.earth.unknown**2
+    before = state.two
+    f = Followed(p.layout, p.gate, variance, sun_b, own, reading.used, rate_b, drift, sun_b, own)
+    if before.other.apart:
+        fit_b, fit_covariance = follow(f, before.fit_b, before.fit_covariance, dt, m.sunlight, top)
+        f = Followed(p.layout, p.gate, variance, sun_b, own, reading.used, rate_b, drift, fit_b, fit_covariance)
+    other, taken = follow_other(f, before.other, dt, m.sunlight, top)
+    if taken:
+        begin(p, m, other.sun_b, trace(other.covariance), aiding.sky.sun_n, cycle.model, cycle.wheels_b)
+        sun_b, covariance = heading_of(p, m, aiding.sky.sun_n, False, reading.used)
+        own = of_row_major(covariance)
+        return Beside(no_second_sun(), taken, sun_b, row_major(own))
+    kept = other.apart and other.odds != 0.0
+    two = TwoSuns(other, f.fit_b, f.fit_covariance) if kept else TwoSuns(other, sun_b, own)
+    return Beside(two, taken, sun_b, with_other(other, sun_b, own, LARGEST))
