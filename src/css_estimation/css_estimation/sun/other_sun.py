@@ -56,8 +56,7 @@ class Followed(NamedTuple):
     informing: int  # mask of the cells that corrected it; 0 in the dark
     rate_b: Vec3  # [rad/s] measured; zeros where there is none
     process_noise: float  # [rad^2/s] of the direction at that rate
-    fit_b: Vec3  # what cells and rate make of the estimate in the way in which the other Sun is followed
-    fit_covariance: Symmetric
+    light: float  # [-] on the cells, by which the estimate explains their outputs; 1: as calibrated
 
 
 @kernel
@@ -120,7 +119,7 @@ def _surely_sees(layout: CellLayout, i: int, lasting: float, sun_b: Vec3, covari
 
 
 @kernel
-def _misfit(f: Followed, voltages, top: int, sun_b: Vec3, covariance: Symmetric) -> float:
+def _misfit(f: Followed, voltages, top: int, light: float, sun_b: Vec3, covariance: Symmetric) -> float:
     """Sum of the normalised squares of what the Sun in a direction leaves of the outputs that it has to explain.
 
     A dark cell that has the Sun in view is one of them unless the error of the direction can have it beyond the edge.
@@ -131,21 +130,9 @@ def _misfit(f: Followed, voltages, top: int, sun_b: Vec3, covariance: Symmetric)
         v = voltages[i]
         # a NaN compares false
         if -READABLE < v < READABLE and (v > level or _surely_sees(f.layout, i, lasting, sun_b, covariance)):
-            left = v - cosine_on(f.layout, i, sun_b)
+            left = v - light * cosine_on(f.layout, i, sun_b)
             total += min(left * left / f.cell_variance, _MOST)
     return total
-
-
-@kernel
-def follow(f: Followed, sun_b: Vec3, covariance: Symmetric, dt: float, voltages, top: int) -> tuple[Vec3, Symmetric]:
-    """A Sun and its covariance after a cycle; arguments as of `follow_other`."""
-    sun_b, covariance = propagate(sun_b, covariance, f.rate_b, dt, f.process_noise)
-    predicted_b = sun_b
-    if f.informing != 0:
-        sun_b, covariance, _, _, _ = update_cells(
-            f.layout, f.gate, f.cell_variance, True, math.sqrt(f.cell_variance), sun_b, covariance, voltages, top
-        )
-    return constrain(sun_b, predicted_b, covariance, _LARGEST_VARIANCE)
 
 
 @kernel
@@ -166,12 +153,20 @@ def follow_other(f: Followed, other: OtherSun, dt: float, voltages, top: int) ->
         return OtherSun(True, apart, image_b, congruence(mirror, f.covariance), 0.0), False
     if not other.alive:
         return no_other_sun(), False
-    sun_b, covariance = follow(f, other.sun_b, other.covariance, dt, voltages, top)
+    sun_b, covariance = propagate(other.sun_b, other.covariance, f.rate_b, dt, f.process_noise)
+    predicted_b = sun_b
+    if lit:
+        sun_b, covariance, _, _, _ = update_cells(
+            f.layout, f.gate, f.cell_variance, True, math.sqrt(f.cell_variance), sun_b, covariance, voltages, top
+        )
+    sun_b, covariance = constrain(sun_b, predicted_b, covariance, _LARGEST_VARIANCE)
     if _within(f.sun_b, f.covariance, sun_b, _COVERED):
         return (OtherSun(True, False, sun_b, covariance, 0.0) if leaves else no_other_sun()), False
     odds = other.odds
     if lit:
-        difference = _misfit(f, voltages, top, sun_b, covariance) - _misfit(f, voltages, top, f.fit_b, f.fit_covariance)
+        difference = _misfit(f, voltages, top, 1.0, sun_b, covariance) - _misfit(
+            f, voltages, top, f.light, f.sun_b, f.covariance
+        )
         odds += 0.5 * min(1.0, dt / _NEWS) * difference
     if odds > _DECIDED:
         return no_other_sun(), False

@@ -80,9 +80,7 @@ def _beside_other(
     sun_b, covariance, mode, restarted = e.sun_b, outcome.covariance, e.mode, e.restarted
     rate_b = aiding.gyro_b if outcome.gyro_ok else (0.0, 0.0, 0.0)
     noise = p.process_noise if outcome.gyro_ok else p.process_noise_without_rate
-    followed = Followed(
-        p.layout, p.gate, p.cell_variance, sun_b, covariance, e.lit_mask, rate_b, noise, sun_b, covariance
-    )
+    followed = Followed(p.layout, p.gate, p.cell_variance, sun_b, covariance, e.lit_mask, rate_b, noise, 1.0)
     other, taken = follow_other(followed, other, dt, voltages, outcome.top)
     if taken:
         sun_b, covariance, other = other.sun_b, other.covariance, no_other_sun()

@@ -13,7 +13,6 @@ from css_estimation.sun.other_sun import OtherSun, no_other_sun
 from css_estimation.sun.sun_heading import VALIDITY_NONE
 from css_estimation.sun_filter.motion import RATE_BY_GYRO, RATE_BY_WALK
 from css_estimation.sun_filter.options import SunFilterParameters
-from css_estimation.symmetric import Symmetric
 
 MODE_WAITING = 0
 MODE_SEARCHING = 1
@@ -53,14 +52,6 @@ class Found(NamedTuple):
     variance: float  # [rad2] on the worst axis
 
 
-class TwoSuns(NamedTuple):
-    """The other Sun, and the estimate as it would be if it were followed in the same way."""
-
-    other: OtherSun
-    fit_b: Vec3
-    fit_covariance: Symmetric
-
-
 class SunFilterState(NamedTuple):
     """Carried from cycle to cycle beside the memory."""
 
@@ -70,7 +61,7 @@ class SunFilterState(NamedTuple):
     validity: int
     age: float  # [s]
     eclipse: EclipseState
-    two: TwoSuns
+    other: OtherSun
 
 
 class Cycle(NamedTuple):
@@ -83,13 +74,6 @@ class Cycle(NamedTuple):
     wheels_b: Vec3  # [N m s]
 
 
-@kernel
-def no_second_sun() -> TwoSuns:
-    """None."""
-    none = no_other_sun()
-    return TwoSuns(none, none.sun_b, none.covariance)
-
-
 AFRESH = Progress(STAGE_SEARCH, False, 0.0, 0.0, 0.0)
 NOT_FOUND = Found((0.0, 0.0, 1.0), math.pi)
 
@@ -98,7 +82,7 @@ def initial_state(p: SunFilterParameters) -> SunFilterState:
     """Nothing known."""
     rate = Rate(RATE_BY_WALK, NO_RATE, NO_RATE)
     return SunFilterState(
-        AFRESH, rate, NOT_FOUND, VALIDITY_NONE, 0.0, eclipse_detector.initial_state(), no_second_sun.py_func()
+        AFRESH, rate, NOT_FOUND, VALIDITY_NONE, 0.0, eclipse_detector.initial_state(), no_other_sun.py_func()
     )
 
 

@@ -129,6 +129,6 @@ def track_cycle(
     if use or use_field:
         best, left = give_up(memory)
     progress, mode = progress_after(
-        p, before, memory, best, left, cycle, use, faded, reading, state.two.other.apart, voltages, aiding
+        p, before, memory, best, left, cycle, use, faded, reading, state.other.apart, voltages, aiding
     )
     return progress, filtered_rate(p, state.rate, cycle, raw_b), reading, mode

@@ -5,8 +5,8 @@ The other one is followed as `ekf` does it (`sun.other_sun`), beside the heading
 While the two are apart the turn about the Sun line is not looked for, which might be the wrong one. If the other one
 turns out to be right the filter begins anew from there.
 
-What decides has to be fair: the filter holds on to its estimate, and whatever the model has wrong it explains worse
-than a Sun that follows the outputs. Compared with the other Sun is therefore what following makes of the estimate.
+What decides has to be fair. The other Sun follows the outputs and makes up for light that cells have lost by its
+direction, where the filter holds on to its own; the estimate is therefore judged with the light that it finds.
 """
 
 from typing import NamedTuple
@@ -14,20 +14,22 @@ from typing import NamedTuple
 from css_common.kernel import kernel
 from css_common.vectors import Vec3
 from css_estimation.sun.cell_layout import brightest
+from css_estimation.sun.fading import light_on
 from css_estimation.sun.left_open import surely_spans_space
-from css_estimation.sun.other_sun import Followed, follow, follow_other, with_other
+from css_estimation.sun.other_sun import Followed, OtherSun, follow_other, no_other_sun, with_other
 from css_estimation.sun.sun_heading import Aiding, Covariance
 from css_estimation.sun_filter.cell_update import CellReading, bit_count
-from css_estimation.sun_filter.filter_state import NO_RATE, Cycle, SunFilterState, TwoSuns, no_second_sun
+from css_estimation.sun_filter.filter_state import NO_RATE, Cycle, SunFilterState
 from css_estimation.sun_filter.hypotheses import begin
 from css_estimation.sun_filter.memory import SunFilterMemory
 from css_estimation.sun_filter.motion import RATE_BY_GYRO
 from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.reported import LARGEST
 from css_estimation.sun_filter.reported import heading as heading_of
-from css_estimation.symmetric import of_row_major, row_major, scaled, trace
+from css_estimation.symmetric import of_row_major, scaled, trace
 
 _LEAST_GAIN = 0.2
+_LEAST_LIGHT = 0.5
 # [rad2/s] How fast the other Sun drifts where a gyro tells how the body turns, and where its own motion would have to.
 _DRIFT, _DRIFT_WITHOUT_RATE = 0.01**2, 0.1**2
 
@@ -35,7 +37,7 @@ _DRIFT, _DRIFT_WITHOUT_RATE = 0.01**2, 0.1**2
 class Beside(NamedTuple):
     """What a cycle comes to."""
 
-    two: TwoSuns
+    other: OtherSun
     taken: bool  # the filter has begun anew, from the other Sun
     sun_b: Vec3
     covariance: Covariance  # to report
@@ -94,20 +96,14 @@ def look_beside(
     """
     own = scaled(of_row_major(covariance), _misfit(p, reading))
     _write_sunlight(p, voltages, m.sunlight)
-    top, dt = brightest(m.sunlight), cycle.dt
     rate_b, drift = _turning(state, cycle, reading, aiding)
     variance = p.errors.noise + p.errors.scale + p.errors.cell + p.earth.unknown**2
-    before = state.two
-    f = Followed(p.layout, p.gate, variance, sun_b, own, reading.used, rate_b, drift, sun_b, own)
-    if before.other.apart:
-        fit_b, fit_covariance = follow(f, before.fit_b, before.fit_covariance, dt, m.sunlight, top)
-        f = Followed(p.layout, p.gate, variance, sun_b, own, reading.used, rate_b, drift, fit_b, fit_covariance)
-    other, taken = follow_other(f, before.other, dt, m.sunlight, top)
+    light = light_on(p.layout, sun_b, m.sunlight, reading.used)
+    light = min(max(light, _LEAST_LIGHT), 1.0) if light > 0.0 else 1.0
+    f = Followed(p.layout, p.gate, variance, sun_b, own, reading.used, rate_b, drift, light)
+    other, taken = follow_other(f, state.other, cycle.dt, m.sunlight, brightest(m.sunlight))
     if taken:
         begin(p, m, other.sun_b, trace(other.covariance), aiding.sky.sun_n, cycle.model, cycle.wheels_b)
         sun_b, covariance = heading_of(p, m, aiding.sky.sun_n, False, reading.used)
-        own = of_row_major(covariance)
-        return Beside(no_second_sun(), taken, sun_b, row_major(own))
-    kept = other.apart and other.odds != 0.0
-    two = TwoSuns(other, f.fit_b, f.fit_covariance) if kept else TwoSuns(other, sun_b, own)
-    return Beside(two, taken, sun_b, with_other(other, sun_b, own, LARGEST))
+        return Beside(no_other_sun(), True, sun_b, covariance)
+    return Beside(other, False, sun_b, with_other(other, sun_b, own, LARGEST))

@@ -23,6 +23,7 @@ from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, dot
 from css_estimation.sun.eclipse_detector import detect_eclipse
+from css_estimation.sun.other_sun import no_other_sun
 from css_estimation.sun.sun_heading import (
     NO_COVARIANCE,
     RATE_GYRO,
@@ -57,7 +58,6 @@ from css_estimation.sun_filter.filter_state import (
     Progress,
     Rate,
     SunFilterState,
-    no_second_sun,
 )
 from css_estimation.sun_filter.following import track_cycle
 from css_estimation.sun_filter.memory import (
@@ -174,11 +174,11 @@ def step(
     eclipse_state, eclipse = detect_eclipse(p.eclipse, state.eclipse, dt, largest, aiding.sky.predicted)
     wheels_b, wheels_ok = wheel_momentum(p.motion, aiding)
     cycle = Cycle(dt, flux, lit, rate_model(p.motion, gyro_usable(p.motion, aiding), wheels_ok), wheels_b)
-    reading, found, two = NOTHING_READ, state.found, no_second_sun()
+    reading, found, other = NOTHING_READ, state.found, no_other_sun()
     if state.progress.stage == STAGE_SEARCH or dt > p.convergence.longest_step:
         if state.progress.stage != STAGE_SEARCH:
             state = SunFilterState(
-                AFRESH, state.rate, NOT_FOUND, state.validity, state.age, state.eclipse, no_second_sun()
+                AFRESH, state.rate, NOT_FOUND, state.validity, state.age, state.eclipse, no_other_sun()
             )
             outlast_estimate(p.calibration, p.cells.shape[0], memory, True)
         progress, rate, found = search_cycle(p, state, memory, cycle, voltages, aiding)
@@ -198,7 +198,7 @@ def step(
             sun_b, covariance = state.found.sun_b, across(state.found.sun_b, LARGEST)
         elif progress.stage == STAGE_HEADING:
             beside = look_beside(p, state, memory, sun_b, covariance, reading, cycle, voltages, aiding)
-            two, sun_b, covariance = beside.two, beside.sun_b, beside.covariance
+            other, sun_b, covariance = beside.other, beside.sun_b, beside.covariance
             if beside.taken:
                 progress = Progress(STAGE_HEADING, True, 0.0, 0.0, 0.0)
         if progress.stage == STAGE_SEARCH:
@@ -234,4 +234,4 @@ def step(
         isolated=0,
         sensors_left=0,
     )
-    return SunFilterState(progress, rate, found, validity, age, eclipse_state, two), heading
+    return SunFilterState(progress, rate, found, validity, age, eclipse_state, other), heading
