@@ -127,10 +127,16 @@ def test_header_and_main_are_without_warnings_in_cplusplus(exported, tmp_path):
 
 @pytest.mark.parametrize("target", OTHERS, ids=lambda target: target.name)
 def test_other_processors_give_the_same_bits(exported, target):
+    """But for the last ones of functions that the C library rounds otherwise there, which are found and named."""
     library, folder, calls = exported
-    write_library(library, [library.for_target(target)], folder)
+    code = library.for_target(target)
+    write_library(library, [code], folder)
     verdict = judged(library, calls, run_library(library, target, folder, calls)[0])
-    assert (verdict.steps, verdict.equal) == (STEPS, STEPS)
+    row = Row(library, code, verdict)
+    assert verdict.steps == STEPS
+    if verdict.equal < STEPS:
+        row.differing = mathematics.differing_functions(code.contents.missing, target, folder)
+    assert row.is_right
 
 
 def test_numbers_in_the_other_order_of_bytes_are_the_same_numbers(exported):
