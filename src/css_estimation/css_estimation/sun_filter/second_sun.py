@@ -64,13 +64,16 @@ def _turning(state: SunFilterState, cycle: Cycle, reading: CellReading, aiding: 
 
 
 @kernel
-def _misfit(p: SunFilterParameters, reading: CellReading) -> float:
+def _misfit(reading: CellReading, spans: bool) -> float:
     """Factor by which innovations are larger than the filter expects, squared; 1 at least.
 
     A cell that is refused is wrong if the others agree on a direction. If they leave one open the estimate may be.
+
+    Args:
+        spans: the cells in use span space.
     """
     squares, count = reading.nis, reading.nis_dof
-    if not surely_spans_space(p.cells, reading.used):
+    if not spans:
         squares, count = squares + reading.against, count + bit_count(reading.refused)
     return max(1.0, squares / max(1, count))
 
@@ -94,7 +97,12 @@ def look_beside(
         sun_b, covariance: of the filter, with the error that the Earth makes.
         reading: of this cycle.
     """
-    own = scaled(of_row_major(covariance), _misfit(p, reading))
+    spans = surely_spans_space(p.cells, reading.used)
+    misfit = _misfit(reading, spans)
+    if spans and misfit == 1.0 and not state.other.alive:
+        # cells that span space and read what is expected leave no other Sun
+        return Beside(no_other_sun(), False, sun_b, covariance)
+    own = scaled(of_row_major(covariance), misfit)
     _write_sunlight(p, voltages, m.sunlight)
     rate_b, drift = _turning(state, cycle, reading, aiding)
     variance = p.errors.noise + p.errors.scale + p.errors.cell + p.earth.unknown**2
