@@ -9,6 +9,7 @@ import csv
 from collections.abc import Iterator
 from pathlib import Path
 
+from css_common.file_text import decoded
 from css_sensors.slits import LOWER, TIMER_SPAN, UPPER, VERTICAL
 
 Pulse = tuple[int, int, int]
@@ -32,8 +33,10 @@ def read_slit_file(path: Path, heads: int = 1) -> list[Pulse]:
         SlitFileError: the file is missing, lacks a column, holds no pulse or a line that is none.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        text = decoded(path.read_bytes())
+    except OSError as error:
+        raise SlitFileError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise SlitFileError(f"{path}: cannot be read: {error}") from error
     lines = ((number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()[:1] not in ("", "#"))
     pulses = list(_pulses(path, lines, heads))

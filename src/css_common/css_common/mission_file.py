@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from css_common.file_text import decoded
 from css_common.parameter_document import DocumentError, read_document
 from css_common.parameter_words import Dumper
 
@@ -42,8 +43,7 @@ def read_text(path: str | Path) -> str:
             raise MissionError(f"{path}: cannot be read: expected a regular file")
         if status.st_size > MOST_BYTES:
             raise MissionError(f"{path}: cannot be read: {status.st_size} bytes, expected at most {MOST_BYTES}")
-        data = Path(path).read_bytes()
-        return data.decode("utf-16" if data[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
+        return decoded(Path(path).read_bytes())
     except OSError as error:
         raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
     except ValueError as error:  # bytes that are no text; a name that no file can have

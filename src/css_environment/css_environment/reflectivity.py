@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.file_text import decoded
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4
 from css_common.vectors import Vec3
@@ -83,8 +84,11 @@ def read_reflectivity(mean_file: str | Path, std_file: str | Path | None = None)
 
 
 def _read_grid(file: Path) -> np.ndarray:
-    with file.open(newline="", encoding="utf-8-sig") as stream:
-        lines = [(number, row) for number, row in enumerate(csv.reader(stream), 1) if "".join(row).strip()]
+    try:
+        text = decoded(file.read_bytes())
+    except ValueError as error:
+        raise ValueError(f"{file}: cannot be read: {error}") from error
+    lines = [(number, row) for number, row in enumerate(csv.reader(text.splitlines()), 1) if "".join(row).strip()]
     if not lines:
         raise ValueError(f"{file}: no values, expected rows of fractions from south to north")
     grid = np.empty((len(lines), len(lines[0][1])))

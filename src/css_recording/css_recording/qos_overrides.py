@@ -29,6 +29,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 
+from css_common.file_text import decoded
 from css_recording.bag_metadata import absolute
 from css_recording.errors import BagError
 
@@ -55,8 +56,10 @@ def read_qos_overrides(path: Path | None) -> dict[str, QoSProfile]:
     if path is None:
         return {}
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
+        document = yaml.safe_load(decoded(path.read_bytes()))
+    except OSError as error:
+        raise BagError(f"{path}: cannot be read: {error.strerror}") from error
+    except ValueError as error:
         raise BagError(f"{path}: cannot be read: {error}") from error
     except yaml.YAMLError as error:
         raise BagError(f"{path}: is no YAML: {' '.join(str(error).split())}") from error

@@ -6,6 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from css_common.file_text import decoded
 from css_recording.errors import BagError
 from css_sensors.cells import MOST_CELLS
 from css_telemetry.description import CellForm, Description, TableForm, Thermal, TimeForm
@@ -31,10 +32,10 @@ def read_description(path: Path) -> Description:
         BagError: it cannot be read; names file, key, value and what was expected.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = decoded(path.read_bytes())
     except OSError as error:
         raise BagError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
+    except ValueError as error:
         raise BagError(f"{path}: cannot be read: {error}") from error
     try:
         description = _from_csv(text) if path.suffix.lower() == ".csv" else description_of(text)

@@ -22,6 +22,7 @@ import numpy as np
 import yaml
 
 from css_common.direction_grid import SIZE, grid_directions
+from css_common.file_text import decoded
 from css_common.kernel import outer_kernel
 from css_design.errors import DesignError
 
@@ -61,10 +62,12 @@ def read_structure(path: Path) -> Structure:
         triangles = _mesh(path, 1.0)
         return _checked(Structure(triangles, len(triangles), np.zeros((0, 3))), path)
     try:
-        given = yaml.safe_load(path.read_text(encoding="utf-8"))
+        given = yaml.safe_load(decoded(path.read_bytes()))
     except OSError as error:
         raise DesignError(f"{path}: cannot be read: {error.strerror}") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except ValueError as error:
+        raise DesignError(f"{path}: cannot be read: {error}") from error
+    except yaml.YAMLError as error:
         raise DesignError(f"{path}: no YAML, expected boxes: [{{centre: [x, y, z], size: [x, y, z]}}, ...]") from error
     if not isinstance(given, dict) or not given or not _KEYS.issuperset(given):
         raise DesignError(f"{path}: expected some of the keys {', '.join(sorted(_KEYS))}")
