@@ -38,13 +38,14 @@ def main() -> int:
     """Flies, checks and counts."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=1)
+    parser.add_argument("--first", type=int, default=0, help="case to begin with: others than those it was tuned on")
     parser.add_argument("--reference", choices=("truth", "batch", "cells"), default="truth")
     parser.add_argument("--missions", nargs="+", choices=tuple(MISSIONS), default=list(MISSIONS))
     options = parser.parse_args()
     total: Counter[str] = Counter()
     began = time.monotonic()
     for name in options.missions:
-        for case in range(options.cases):
+        for case in range(options.first, options.first + options.cases):
             healthy = None
             for kind in (None, *FAULTS):
                 flight = flown(faulted(name, case, kind))
