@@ -18,6 +18,7 @@ from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
 from css_environment.orbit_checks import recorded_orbit_findings
+from css_estimation.health.coarse_steps import coarse_lines
 from css_recording.bag_folder import free_name
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
@@ -173,7 +174,7 @@ def replay(
         runs,
         stepping.rejected,
         stepping.missing,
-        [*reader.notes, *damaged, *stepping.reports, *_places_in_doubt(stepping)],
+        [*reader.notes, *damaged, *stepping.reports, *_places_in_doubt(stepping), *_too_coarse(stepping, log)],
         incidents,
         elsewhere,
         (stepping.last_ns - stepping.first_ns) * 1e-9,
@@ -189,6 +190,15 @@ def _places_in_doubt(stepping: Replay) -> list[str]:
         if hasattr(run.node.values, "orbit"):
             found = recorded_orbit_findings(run.node.values, stepping.first_ns, stepping.last_ns)
             lines |= dict.fromkeys(f"{run.label}: {finding.text}" for finding in found)
+    return list(lines)
+
+
+def _too_coarse(stepping: Replay, log: FlightLog) -> list[str]:
+    """What the steps of the recording are too long to tell of the health of sensors."""
+    lines: dict[str, None] = {}
+    for run in stepping.runs:
+        if run.label in log.estimates:
+            lines |= dict.fromkeys(coarse_lines(run.node.values, log.estimates[run.label].stamp_ns))
     return list(lines)
 
 

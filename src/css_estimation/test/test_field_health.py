@@ -11,7 +11,7 @@ from css_estimation.health.field_health import check_field
 from css_estimation.health.gyroless_sight import glimpse_of
 from css_estimation.health.rate_checks import new_axes
 from css_estimation.health.sight import Sight
-from css_estimation.health.slow_value import NOTHING_YET, follow
+from css_estimation.health.slow_value import NOTHING_YET, follow, passed
 from css_estimation.sun.sun_heading import LEFT_FIELD, PREDICTION_SUNLIT, UNKNOWN_SKY, Sky
 
 P = parameters()
@@ -125,7 +125,7 @@ def test_a_slow_value_is_followed_within_its_variance():
         slow = NOTHING_YET
         for k in range(400):
             true = 3e-5 + rate / motion * np.sin(motion * k + phase)
-            slow = follow(slow, true + sigma * dice.normal(), sigma**2, 1.0, rate, motion)
+            slow = follow(passed(slow, 1.0, rate, motion), true + sigma * dice.normal(), sigma**2, rate)
         nis.append(slow.nis)
         off.append((slow.value - true) / np.sqrt(slow.p))
     assert 0.7 < np.mean(nis) < 1.3

@@ -44,7 +44,7 @@ class Turning:
         outputs[outputs == 0.0] = self.earth
         gyro = vector_of(np.asarray(gyro_b, float))
         self.led = follow_gyro(
-            self.p, self.cells, self.led, DT, outputs, NO_SPEEDS, UNKNOWN_SKY, gyro, True, glimpse, LARGEST
+            self.p, self.cells, self.led, DT, outputs, NO_SPEEDS, UNKNOWN_SKY, gyro, True, glimpse, LARGEST, 0.0
         )
 
     def fly(self, seconds, error=(0.0, 0.0, 0.0)):

@@ -18,6 +18,7 @@ from css_estimation.health.cell_evidence import (
     trust_again,
 )
 from css_estimation.health.cell_expectation import DOUBTFUL, HIDDEN, SEEN, SURE, contradiction, expected
+from css_estimation.health.cell_lines import judge_line
 from css_estimation.health.cell_memory import (
     DIRECTIONS,
     PHASE_FOLLOWING,
@@ -42,7 +43,8 @@ from css_estimation.symmetric import isotropic, trace
 
 MOST_AT_ONCE = 0.5
 """Time [s] that one look counts for, however long after the last."""
-_LONGEST = 10.0  # [s] beyond it nothing is known of how the body turned
+LONGEST_STEP = 10.0
+"""Time [s] from look to look beyond which nothing is known of how the body turned: each stands alone."""
 _USELESS = 0.5  # [rad^2] of a direction that has to be looked for anew
 _NOISE, _NOISE_WITHOUT_RATE = 0.02**2, 0.1**2  # [rad^2/s]
 _SEARCH_EVERY = 0.999  # [s]
@@ -58,6 +60,7 @@ _BRIGHT = 0.45  # of the light
 _FADED = 0.75  # share of the light below which it sets
 _LONGEST_FADE = 15.0  # [s] after which it does not
 _LIGHT_MEMORY = 20.0  # [s]
+_LINE = 2.0  # [s] of it, that a line is worth which stands alone
 UNEXPLAINED = 5.0
 """Squared sigmas of all cells together beyond which a direction does not explain them."""
 _DOUBT = 20.0  # [s]
@@ -77,7 +80,7 @@ def carried(track: Track, turn_b: Vec3, window: float, rate_sure: bool) -> Track
     mean_b = scale(1.0 / max(window, 1e-9), turn_b)
     sun_b, covariance = propagate(track.sun_b, track.covariance, mean_b, window, noise)
     phase, since, doubt = track.phase, track.since, track.doubt
-    if phase != PHASE_LOOKING and (window > _LONGEST or 0.5 * trace(covariance) > _USELESS):
+    if phase != PHASE_LOOKING and (window > LONGEST_STEP or 0.5 * trace(covariance) > _USELESS):
         phase, since, doubt = PHASE_LOOKING, 0.0, 0.0
     frame = matmul(rotation_vector_to_dcm(turn_b), track.frame)
     return Track(
@@ -144,7 +147,7 @@ def looked(
 ) -> Track:
     """The track after a look in the Sun."""
     if track.phase == PHASE_LOOKING:
-        return _looking(p, memory, track, window, rate_sure)
+        return _looking(p, memory, track, window, rate_sure, step)
     # a Sun that sets, or rises, is dimmer for all alike, and not for long
     share = _brightest_share(p, memory, track)
     faded = track.faded + window if share < _FADED else 0.0
@@ -199,26 +202,38 @@ def _found(track: Track, sun_b: Vec3, phase: int) -> Track:
 
 
 @kernel
-def _weighed(p: CellHealthParameters, memory: CellHealthMemory, track: Track, rate_sure: bool) -> tuple[float, Vec3]:
+def _weighed(
+    p: CellHealthParameters, memory: CellHealthMemory, outputs, track: Track, rate_sure: bool
+) -> tuple[float, Vec3]:
     """Likelihood of the best hypothesis after a look of the search, and its direction to the Sun."""
     kept = _KEPT if rate_sure else _KEPT_WITHOUT_RATE
-    weigh(p, memory, memory.judged, track.frame, track.light, kept)
+    weigh(p, memory, outputs, track.frame, track.light, kept)
     best, g = judge_hypotheses(memory)
     return best, multiply(track.frame, direction(g, DIRECTIONS))
 
 
 @kernel
-def _looking(p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool) -> Track:
+def _looking(
+    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool, step: int
+) -> Track:
     """A look without a direction to follow."""
     frame, since, searched = track.frame, track.since, track.searched
-    if since == 0.0:
+    alone = window > LONGEST_STEP
+    if since == 0.0 or alone:
         begin_search(memory, track.sun_b, 1.0, 0.0)
-        frame, searched = IDENTITY, _SEARCH_EVERY + window
+        since, frame, searched = 0.0, IDENTITY, _SEARCH_EVERY + window
     since += window
     track = Track(track.phase, since, 0.0, 0.0, _DOUBT, searched, track.sun_b, track.covariance, track.light, frame)
     if searched <= _SEARCH_EVERY:
         return track
-    best, sun_b = _weighed(p, memory, track, rate_sure)
+    # whether cells that are left out are right again many looks tell, not one
+    best, sun_b = _weighed(p, memory, memory.used if alone else memory.judged, track, rate_sure)
+    light = track.light
+    if alone:
+        at = Track(track.phase, since, 0.0, 0.0, _DOUBT, 0.0, sun_b, isotropic(_START_VARIANCE), light, track.frame)
+        light = _light(p, memory, at, _LINE)
+        judge_line(p, memory, step)
+    track = Track(track.phase, since, 0.0, 0.0, _DOUBT, searched, track.sun_b, track.covariance, light, track.frame)
     elsewhere = likelihood_far(memory, track.frame, sun_b)
     if since >= _FIRST_SEARCH and (best - elsewhere > _CLEAR or since > _LONGEST_SEARCH):
         return _found(track, sun_b, PHASE_FOLLOWING)
@@ -235,7 +250,7 @@ def _searching(
     window: float,
 ) -> Track:
     """A look of the search beside a direction that is followed."""
-    best, sun_b = _weighed(p, memory, track, rate_sure)
+    best, sun_b = _weighed(p, memory, memory.judged, track, rate_sure)
     for i in range(memory.cells.shape[0]):
         if memory.verdicts[i].held == 0 and memory.against[i] > _GUILTY:
             leave_out(p, memory, i, memory.against[i], _GUILTY, step)

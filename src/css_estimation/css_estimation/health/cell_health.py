@@ -40,8 +40,10 @@ from css_estimation.health.cell_signals import in_range, note_outputs
 from css_estimation.health.cell_votes import judge_votes
 from css_estimation.health.common_darkness import (
     LATE,
+    SHORTEST_DAY,
     judge_darkness,
     judge_lasting_darkness,
+    lasted,
     see_light_again,
 )
 from css_estimation.health.sight import Sight
@@ -93,8 +95,9 @@ def watch_cells(
     turn_b = add(state.turn_b, scale(dt, omega_bn_b)) if rate_known else state.turn_b
     window, step = state.window + dt, state.step + 1
     track, isolated = state.track, state.isolated
-    night = state.night + dt if sky.known and sky.illumination <= 0.0 else 0.0
-    day = state.day + dt if sky.known and sky.illumination >= 1.0 else 0.0
+    night = lasted(state.night, dt, SHORTEST_DAY) if sky.known and sky.illumination <= 0.0 else 0.0
+    # a shadow that is only touched may be as short as it likes
+    day = lasted(state.day, dt, LATE) if sky.known and sky.illumination >= 1.0 else 0.0
     darkness = state.darkness
     if window > _LOOK or step == 1:
         track = carried(track, turn_b, window, rate_sure)

@@ -31,6 +31,8 @@ WATCHED = np.dtype(
         ("sure", np.int64),  # 1: left out while the direction had been sure for long
         ("vote", np.float64),  # contradiction by those that look the same way
         ("vote_step", np.int64),  # when that began
+        ("line", np.float64),  # that it is dead, by lines that stand alone
+        ("line_step", np.int64),  # when that began
         ("opposite", np.float64),  # by those that look another way
         ("opposite_step", np.int64),
         ("good", np.float64),  # [s] of agreement since it was left out
@@ -113,12 +115,14 @@ class Darkness(NamedTuple):
     time: float  # [s] for which all that must see the Sun have been dark
     mask: int  # those cells
     at_once: bool  # they went dark at once
-    unlit: float  # [s] since a cell was lit, without a model
-    unlit_step: int  # when that was
+    unlit: float  # [s] for which all looks have been dark, without a model; 0: the last was not
+    unlit_step: int  # when a cell was last lit, or nobody looked for so long that one may have been
+    unread: float  # [s] since a look at which a cell gave an output
+    told: int  # mask of the cells that gave one at each dark look
     lasting: bool  # it has outlasted all eclipses
 
 
-NO_DARKNESS = Darkness(0.0, 0.0, 0, False, 0.0, 0, False)
+NO_DARKNESS = Darkness(0.0, 0.0, 0, False, 0.0, 0, 0.0, -1, False)
 
 
 class CellHealthState(NamedTuple):
@@ -127,8 +131,8 @@ class CellHealthState(NamedTuple):
     track: Track
     turn_b: Vec3  # [rad] since the last look
     window: float  # [s] since the last look
-    night: float  # [s] for which the model of the orbit has had no Sun
-    day: float  # [s] for which it has had all of it
+    night: float  # [s] for which the model of the orbit has had no Sun, as far as looks follow one another
+    day: float  # [s] for which it has had all of it, likewise
     darkness: Darkness
     step: int  # number of this cycle
     isolated: int  # mask

@@ -144,6 +144,14 @@ def judge_hypotheses(memory: CellHealthMemory) -> tuple[float, int]:
 
 
 @kernel
+def gain_without(memory: CellHealthMemory, i: int) -> float:
+    """By how much fewer squared sigmas all outputs are off the best direction if cell `i` fails, and no other does."""
+    healthy, _ = _largest(memory.grid, 0)
+    failed, _ = _largest(memory.grid, 1 + i)
+    return 2.0 * (failed - _odds(memory, i) - healthy)
+
+
+@kernel
 def _largest(grid, h: int) -> tuple[float, int]:
     best, at = -math.inf, 0
     for g in range(DIRECTIONS):

@@ -8,7 +8,8 @@ darkness that came slowly has to outlast what a model may be late. Cells that ag
 ends it.
 
 Without a model a dead board is an eclipse until no eclipse lasts so long. Then no cell that is dark is believed any
-more, unless the cells leave a part of the sky unseen, where the Sun may be.
+more, unless the cells leave a part of the sky unseen, where the Sun may be. Time counts between looks at which cells
+gave an output, and none of which is so long that the Sun may have risen and set unseen.
 """
 
 import math
@@ -28,6 +29,9 @@ from css_estimation.sun.sun_heading import Sky
 
 LATE = 60.0
 """Time [s] by which a model of the orbit may be late or early about the shadow."""
+SHORTEST_DAY = 2600.0
+"""Time [s] of Sun between two shadows, at least: half of the shortest orbit. Darkness before and after a longer time
+without a look may be that of two shadows."""
 _DARK_TIME = 10.0  # [s]
 _AT_ONCE = 1.5  # [s] from most of the light to darkness: three looks
 _MOST_OF_IT = 0.75  # of what a cell should read
@@ -77,7 +81,7 @@ def _given_up(memory: CellHealthMemory, darkness: Darkness, waning: float) -> Da
         if darkness.mask >> i & 1 and memory.verdicts[i].held == 0:
             drop_evidence(memory, i)
     d = darkness
-    return Darkness(waning, 0.0, 0, False, d.unlit, d.unlit_step, d.lasting)
+    return Darkness(waning, 0.0, 0, False, d.unlit, d.unlit_step, d.unread, d.told, d.lasting)
 
 
 @kernel
@@ -117,7 +121,7 @@ def judge_darkness(
     if time > needed:
         _hold_dark(memory, mask, time, needed)
     d = darkness
-    return Darkness(waning, time, mask, at_once, d.unlit, d.unlit_step, d.lasting)
+    return Darkness(waning, time, mask, at_once, d.unlit, d.unlit_step, d.unread, d.told, d.lasting)
 
 
 @kernel
@@ -149,31 +153,61 @@ def judge_lasting_darkness(
     """
     d = darkness
     if lit or sky.known:
-        return Darkness(d.waning, d.time, d.mask, d.at_once, 0.0, step, d.lasting and not lit)
-    unlit, unlit_step, lasting = d.unlit + window, d.unlit_step, d.lasting
+        return Darkness(d.waning, d.time, d.mask, d.at_once, 0.0, step, 0.0, -1, d.lasting and not lit)
+    since, told = d.unread + window, _given(memory)
+    if told == 0:
+        return Darkness(d.waning, d.time, d.mask, d.at_once, d.unlit, d.unlit_step, since, d.told, d.lasting)
+    unlit, unlit_step, lasting = lasted(d.unlit, since, SHORTEST_DAY), d.unlit_step, d.lasting
+    if since > SHORTEST_DAY:
+        unlit_step = step
+    else:
+        told &= d.told
     if unlit > p.longest_eclipse and not lasting:
-        if _sees_all(p):
+        if _sees_all(p, told):
             for i in range(memory.cells.shape[0]):
                 # a NaN compares false
-                if memory.verdicts[i].held == 0 and abs(memory.used[i]) < _darkest(p):
+                dark = told >> i & 1 == 1 and abs(memory.used[i]) < _darkest(p)
+                if memory.verdicts[i].held == 0 and dark:
                     begin_evidence(memory, i, step)
                     hold_for_dead(memory, i, EVIDENCE_COMMON, unlit, p.longest_eclipse, unlit_step)
                     memory.used[i] = math.nan
             lasting = True
         else:
-            unlit, unlit_step = 0.0, step
-    return Darkness(d.waning, d.time, d.mask, d.at_once, unlit, unlit_step, lasting)
+            unlit, unlit_step, told = 0.0, step, -1
+    return Darkness(d.waning, d.time, d.mask, d.at_once, unlit, unlit_step, 0.0, told, lasting)
 
 
 @kernel
-def _sees_all(p: CellHealthParameters) -> bool:
-    """Whether the Sun lights a cell wherever it stands."""
+def lasted(before: float, since: float, longest: float) -> float:
+    """Time [s] for which something has been so at each look, at one at which it is.
+
+    Args:
+        before: the same at the look before; 0: it was not so.
+        since: [s] since that look.
+        longest: [s] without a look within which nothing else can have been.
+    """
+    return before + since if before > 0.0 and since <= longest else min(since, MOST_AT_ONCE)
+
+
+@kernel
+def _given(memory: CellHealthMemory) -> int:
+    """Mask of the cells in use that gave an output."""
+    mask = 0
+    for i in range(memory.used.shape[0]):
+        if not math.isnan(memory.used[i]):
+            mask |= 1 << i
+    return mask
+
+
+@kernel
+def _sees_all(p: CellHealthParameters, told: int) -> bool:
+    """Whether the Sun lights a cell of a mask wherever it stands."""
     for g in range(DIRECTIONS):
         sun_b = direction(g, DIRECTIONS)
         seen = False
         for i in range(p.layout.cells.shape[0]):
-            in_part = p.screened >> i & 1 == 1
-            if not in_part and sees(p.layout, i, sun_b) and cosine_on(p.layout, i, sun_b) > p.minimum:
+            whole = told >> i & 1 == 1 and p.screened >> i & 1 == 0
+            if whole and sees(p.layout, i, sun_b) and cosine_on(p.layout, i, sun_b) > p.minimum:
                 seen = True
         if not seen:
             return False
@@ -202,4 +236,4 @@ def see_light_again(p: CellHealthParameters, memory: CellHealthMemory, darkness:
     for i in range(memory.cells.shape[0]):
         if memory.verdicts[i].held == 1 and memory.verdicts[i].evidence == EVIDENCE_COMMON:
             trust_again(memory, i)
-    return Darkness(d.waning, d.time, d.mask, d.at_once, 0.0, d.unlit_step, False)
+    return Darkness(d.waning, d.time, d.mask, d.at_once, 0.0, d.unlit_step, 0.0, -1, False)

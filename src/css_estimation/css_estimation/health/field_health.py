@@ -36,12 +36,14 @@ from css_estimation.health.rate_checks import (
     forget_samples,
     gamma_quantile,
 )
-from css_estimation.health.slow_value import NOTHING_YET, SlowValue, follow
+from css_estimation.health.slow_value import NOTHING_YET, SlowValue, follow, passed
 from css_estimation.sun.sun_heading import Sky
 
 _SIGMAS = 6.0
 _NIS_DEGREES = 19.0  # of innovations averaged over ten measurements
 _LONGEST_TRIAL = 3600.0  # [s]
+_OLDEST_SIGHT = 2.0  # [s]
+_MOST_AT_ONCE = 1.0  # [s] that one reading counts for, however long after the last
 _EARTH = 3.986004418e14  # [m3/s2]
 _FASTEST = math.sqrt(_EARTH / 6.678e6**3)  # [rad/s] of an orbit at 300 km
 _STRENGTH_RATE = 1.5  # of the strength: along a polar orbit it doubles within a quarter, times the mean motion
@@ -178,6 +180,8 @@ def check_field(
         State; reading to go on with [T]; whether there is one; whether the magnetometer is left.
     """
     since = state.since + dt if state.since >= 0.0 else state.since
+    # it is that of the last cycle, and the body turns
+    sight = Glimpse(sight.sun_b, sight.covariance, sight.known and dt <= _OLDEST_SIGHT)
     if not valid:
         silent = since > p.silence and state.since <= p.silence
         if silent:
@@ -203,14 +207,16 @@ def check_field(
         by_strength, by_angle = _against_model(p, good_b, sky, sight)
         weak = not size > p.least
         contradicted = weak or by_strength > p.threshold or by_angle > p.threshold
-        off = off + interval if contradicted else 0.0
-        strength = follow(strength, size, p.variance, interval, _STRENGTH_RATE * _FASTEST * size, _FASTEST)
+        off = off + min(interval, _MOST_AT_ONCE) if contradicted else 0.0
+        by_orbit = _STRENGTH_RATE * _FASTEST * size
+        strength = follow(passed(strength, interval, by_orbit, _FASTEST), size, p.variance, by_orbit)
+        angle = passed(angle, interval, _ANGLE_RATE * _FASTEST, _FASTEST)
         if sight.known and size > 0.0:
             # of the angle itself the change would have a kink where the two directions meet
             cosine = dot(good_b, sight.sun_b) / size
             spread = p.variance / (size * size) + most_across(sight.covariance) + _SIGHT
             variance = max(1.0 - cosine * cosine, 0.0) * spread + 0.5 * spread * spread
-            angle = follow(angle, cosine, variance, interval, _ANGLE_RATE * _FASTEST, _FASTEST)
+            angle = follow(angle, cosine, variance, _ANGLE_RATE * _FASTEST)
         if off > p.persistence:
             failed = True
             by_sun = by_angle > by_strength and not weak

@@ -5,9 +5,11 @@ Modes and remedies stand in `gyro_state`. The Sun tells of two axes; of that alo
 jumps, until the line has moved through the body. Without the Sun nothing is judged but samples, and all verdicts stand.
 """
 
+import math
+
 from css_common.health import EVIDENCE_DEAD, EVIDENCE_NOISE, EVIDENCE_SUN, KIND_SILENT, hold, release
 from css_common.kernel import kernel
-from css_common.vectors import Vec3, add, matmul, multiply, scale
+from css_common.vectors import Vec3, add, matmul, multiply, norm, scale
 from css_estimation.health.gyro_bias import corrected
 from css_estimation.health.gyro_judgement import heed_jumps, judge
 from css_estimation.health.gyro_samples import READING_ABSENT, READING_FAILED, READING_JUMPED, check_samples
@@ -19,8 +21,8 @@ from css_estimation.health.gyro_state import (
     Readings,
     leave,
 )
-from css_estimation.health.gyroless_sight import Glimpse
-from css_estimation.health.rate_checks import forget_samples
+from css_estimation.health.gyroless_sight import MOST_FOLLOWED, Glimpse
+from css_estimation.health.rate_checks import forget_samples, unknown_turn
 from css_estimation.health.reference_line import off_the_gyro
 from css_estimation.health.sight_line import (
     begin_again,
@@ -58,7 +60,10 @@ def _compare_with_sun(
     # the sight is that of the last cycle
     rate_b = scale(0.5, add(r.before_b, r.rate_b))
     opinion = state.opinion
-    line, behind_b = follow_sight(p.sight, state.sight, r.dt, rate_b, opinion.bias.bias_b, p.largest_error, sight)
+    rate = norm(rate_b)
+    unknown = unknown_turn(p.checks, rate, r.dt) if rate * r.dt < MOST_FOLLOWED else math.inf
+    bias_b = opinion.bias.bias_b
+    line, behind_b = follow_sight(p.sight, state.sight, r.dt, rate_b, bias_b, p.largest_error, unknown, sight)
     if sight.known and line.line.time >= p.block:
         white = whitening(p.sight, line, sight, r.dt, p.checks.noise * p.checks.noise)
         block = line.line

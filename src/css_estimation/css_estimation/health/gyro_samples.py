@@ -27,6 +27,7 @@ from css_estimation.health.rate_checks import (
     RateChecks,
     check_sample,
     has_noise,
+    longest_run,
     restless,
 )
 
@@ -55,7 +56,7 @@ def _accuse(p: RateChecks, axis, row, status: int, step: int) -> None:
         if row.kind != kind:
             rename(row, kind)
     elif status == SAMPLE_STUCK:
-        hold(row, kind, EVIDENCE_STUCK, float(axis.equal), float(p.equal - 1), step - axis.equal)
+        hold(row, kind, EVIDENCE_STUCK, float(axis.equal), float(longest_run(p, axis) - 1), step - axis.equal)
     elif status == SAMPLE_RANGE:
         hold(row, kind, EVIDENCE_RANGE, axis.gap, p.patience, step)
     elif status == SAMPLE_SPIKY:

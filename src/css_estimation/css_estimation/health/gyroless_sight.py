@@ -13,13 +13,14 @@ from typing import Any, NamedTuple
 from css_common.declared import built
 from css_common.kernel import kernel
 from css_common.schema import Parameter, Values
-from css_common.vectors import Vec3
+from css_common.vectors import Vec3, norm
 from css_estimation.health.cell_expectation import DOUBTFUL, HIDDEN, SEEN, SURE, expected
 from css_estimation.health.cell_options import CellHealthParameters
+from css_estimation.health.rate_checks import LARGEST_UNKNOWN, RateChecks, unknown_turn
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_cycle
 from css_estimation.sun.cell_layout import READABLE, cosine_on
-from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky
+from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_cycle import SunlineParameters, SunlineState, step_alone
 from css_estimation.symmetric import Symmetric, add_outer, isotropic, trace
@@ -37,6 +38,8 @@ _FIT, _GROSS = 0.5, 12.0
 _STRIKES = 2
 _FOUND = 0.1  # [rad^2] of a Sun that is found: 18 deg
 _PATIENCE = 30.0  # [s] of light
+MOST_FOLLOWED = 0.5
+"""Turn [rad] of a body between two looks that a filter without a gyro follows: what cells say is linear in less."""
 _ALONG = 1e-4  # [rad^2] along the Sun line
 _NO_RATE = (0.0, 0.0, 0.0)
 
@@ -104,8 +107,36 @@ def glimpse_of(sight: Sight) -> Glimpse:
 
 
 @kernel
+def _stepped(
+    p: SunlineParameters, state: SunlineState, dt: float, voltages, aiding: Aiding, unknown: float
+) -> tuple[SunlineState, SunHeading]:
+    """One cycle of a filter in which the body may have turned by what no rate tells, a variance [rad^2]."""
+    # here, as kernels hand no arrays back
+    unsure = SunlineParameters(
+        p.layout,
+        p.gate,
+        p.cell_variance,
+        p.process_noise + unknown / max(dt, 1e-9),
+        p.process_noise_without_rate + unknown / max(dt, 1e-9),
+        p.initial_variance,
+        p.largest_variance,
+        p.propagate_filtered,
+        p.tracking,
+    )
+    return step_alone(unsure, state, dt, voltages, aiding)
+
+
+@kernel
 def look(
-    p: SunlineParameters, state: Gyroless, dt: float, voltages, speeds, sky: Sky, found: bool, found_b: Vec3
+    p: SunlineParameters,
+    checks: RateChecks,
+    state: Gyroless,
+    dt: float,
+    voltages,
+    speeds,
+    sky: Sky,
+    found: bool,
+    found_b: Vec3,
 ) -> tuple[Gyroless, Glimpse]:
     """State and sight after one cycle.
 
@@ -113,6 +144,7 @@ def look(
     where the Sun is found over the whole sphere, or is believed after long.
 
     Args:
+        checks: what the body may do between two cycles.
         dt: [s] since the last cycle.
         voltages: (N,) [-] of cells that can be trusted, NaN for all others.
         speeds: (0,) of no wheels.
@@ -120,13 +152,19 @@ def look(
         found, found_b: the Sun is found by all cells together, and where.
     """
     before = state.filter
+    unknown = unknown_turn(checks, norm(before.tracking.omega_bn_b), dt)
+    if unknown > LARGEST_UNKNOWN:
+        # a Sun that was found is somewhere else now
+        state, found = Gyroless(before, False, 0.0), False
     if found and not state.found:
         before = _begun(before, found_b, isotropic(_FOUND))
     unaided = Aiding(_NO_RATE, False, _NO_RATE, False, speeds, False, sky)
-    after, heading = step_alone(p, before, dt, voltages, unaided)
+    after, heading = _stepped(p, before, dt, voltages, unaided, unknown)
     lit = heading.validity == VALIDITY_VALID and after.started
     waited = state.waited + dt if lit else state.waited
-    known = lit and (found or state.found or waited > _PATIENCE) and least_across(after.covariance) < _SURE
+    believed = lit and (found or state.found or waited > _PATIENCE)
+    followed = norm(after.tracking.omega_bn_b) * dt < MOST_FOLLOWED
+    known = believed and followed and least_across(after.covariance) < _SURE
     return Gyroless(after, found or state.found, waited), Glimpse(heading.sun_b, after.covariance, known)
 
 
@@ -206,6 +244,7 @@ def follow_gyro(
     gyro_valid: bool,
     glimpse: Glimpse,
     largest: float,
+    unknown: float,
 ) -> Led:
     """After one cycle; a filter whose cells misfit is begun anew where the cells alone see the Sun.
 
@@ -213,14 +252,16 @@ def follow_gyro(
         gyro_b, gyro_valid: of the cycle of the voltages.
         glimpse: of the same.
         largest: misfit that contradicts.
+        unknown: of the turn in `dt`, as of `unknown_turn` [rad^2].
     """
-    if not gyro_valid:
+    # where the body may be anywhere, nobody leads
+    if not gyro_valid or unknown > LARGEST_UNKNOWN:
         return Led(led.filter, 0.0, -_SETTLING, led.strikes)
     if led.since < 0.0:
         since = led.since + dt if glimpse.known else -_SETTLING
         return _begin(led, glimpse, led.strikes) if since >= 0.0 else Led(led.filter, 0.0, since, led.strikes)
     aided = Aiding(gyro_b, True, _NO_RATE, False, speeds, False, sky)
-    state, heading = step_alone(p, led.filter, dt, voltages, aided)
+    state, heading = _stepped(p, led.filter, dt, voltages, aided, unknown)
     misfit, since = led.misfit, led.since + dt
     squares, count = _misfit(p, cells, state, voltages)
     if heading.nis_dof > 0 and count > 0:

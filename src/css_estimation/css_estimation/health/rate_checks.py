@@ -4,8 +4,9 @@
 range    not a number, or a rate beyond any of this spacecraft
 spike    farther from the last good sample than noise and torques can bring it: that one is left out. When the next
          ones agree with it, it was a jump: the body cannot have done it, so the error of the gyro has changed by it
-stuck    so often the very same number that noise and rounding would show it once in 1e9 runs; judged once an axis of
-         the sensor has shown noise
+stuck    so often the very same number that noise and rounding would show it once in 1e9 runs, and once in as many of
+         this axis, by how often its samples have repeated so far: telemetry may be rounded more coarsely than the
+         sensor; judged once an axis of the sensor has shown noise
 noise    squared differences of successive samples, averaged, beyond what noise and torques make of them
 
 A body without torque changes its rate by |J^-1 (w x J w)| < |w|^2 at most, whatever its moments of inertia, which add
@@ -22,6 +23,8 @@ from css_common.kernel import kernel
 from css_common.schema import real
 
 _FALSE_ALARM = 1e-9  # of one run of samples
+_LOG_FALSE_ALARM = math.log(_FALSE_ALARM)
+_PRIOR = 2.0  # samples that repeat, and as many that do not, that an axis is thought to have shown
 _FEWEST_EQUAL = 5  # a message that came twice or thrice is not a stuck axis
 _MOST_EQUAL = 1000
 _AGREEING = 4  # samples in a row make a jump
@@ -53,6 +56,7 @@ GYRO_AXIS = np.dtype(
         ("came_by_jump", np.int64),  # what it reads now was jumped to
         ("jumped", np.int64),  # in this cycle
         ("changes", np.int64),  # samples that were not as the one before
+        ("repeats", np.int64),  # samples that were, of no run more than may be usual
     ],
     align=True,
 )
@@ -116,6 +120,25 @@ class RateChecks(NamedTuple):
 PARAMETERS = table_of(RateChecks)
 
 
+LARGEST_UNKNOWN = 0.25
+"""Variance [rad^2] of a turn, per axis, beyond which the rates before and after say nothing of it."""
+
+
+@kernel
+def unknown_turn(p: RateChecks, rate: float, dt: float) -> float:
+    """Variance of the turn between two samples [rad^2], per axis, that no mean of the two rates tells.
+
+    Between them the rate may have gone away and come back as fast as torques allow, and so a quarter of that times the
+    square of the time: 3 sigma. It is next to nothing for steps of a second, and everything for those of a minute.
+
+    Args:
+        rate: of the body [rad/s], all axes.
+        dt: [s] from one sample to the other.
+    """
+    bound = 0.25 * (p.acceleration + rate * rate) * dt * dt
+    return bound * bound / 9.0
+
+
 def new_axes() -> np.ndarray:
     """Nothing seen on any axis."""
     return np.zeros(3, GYRO_AXIS)
@@ -125,6 +148,15 @@ def new_axes() -> np.ndarray:
 def has_noise(axes) -> bool:
     """Whether some axis (3,) has shown noise: one of a sensor without any may read the same for ever."""
     return axes[0].changes >= _FEWEST_EQUAL or axes[1].changes >= _FEWEST_EQUAL or axes[2].changes >= _FEWEST_EQUAL
+
+
+@kernel
+def longest_run(p: RateChecks, axis) -> int:
+    """How many samples in a row must be as the one before until neither noise nor rounding explains it."""
+    # the chance of the most usual number is no more than the root of that of a repetition, the sum of all squared
+    chance = math.sqrt((axis.repeats + _PRIOR) / (axis.repeats + axis.changes + 2.0 * _PRIOR))
+    usual = math.ceil(_LOG_FALSE_ALARM / math.log(chance))
+    return min(max(p.equal, usual), _MOST_EQUAL)
 
 
 @kernel
@@ -163,12 +195,13 @@ def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
     if change == 0.0:
         axis.equal += 1
     else:
+        axis.repeats += min(axis.equal, longest_run(p, axis))
         axis.equal = 0
         axis.changes += 1
         axis.came_by_jump = 1 if abs(change) > step else 0
         axis.zeros += 1 if x == 0.0 else 0
     axis.raw = x
-    if axis.equal >= p.equal:
+    if axis.equal >= p.equal and axis.equal >= longest_run(p, axis):
         return SAMPLE_STUCK
     off = abs(x - axis.good) > p.gate + by_torque * axis.gap
     axis.refused += _SHARE * ((1.0 if off else 0.0) - axis.refused)

@@ -5,8 +5,9 @@ The error of a sight by cells is hardly noise. What the Earth throws on a cell a
 as the body does; it wanders as the body turns, and as clouds pass. Within a block of time T at a rate w it walks by
 2 sigma^2 (1 / time + w / angle) T, the beginning of an Ornstein-Uhlenbeck process, which is what a block is worth.
 White noise is measured in flight: how the sight jitters from cycle to cycle about the way that the gyro gives it.
-Where it jumps, as when a cell comes into view, by more than noise and any error of the gyro can make it within a cycle,
-the block is given up.
+What the body may have turned between two samples of the gyro, and no rate tells, comes on top (`unknown_turn`); a step
+so long that this may be anything ends the block. Where the sight jumps, as when a cell comes into view, by more than
+noise and any error of the gyro can make it within a cycle, the block is given up too.
 """
 
 import math
@@ -18,6 +19,7 @@ from css_common.kernel import kernel
 from css_common.schema import real
 from css_common.vectors import Mat3, Vec3, add, axes_across, cross, dot, scale, subtract
 from css_estimation.health.gyroless_sight import Glimpse
+from css_estimation.health.rate_checks import LARGEST_UNKNOWN
 from css_estimation.health.reference_line import NO_LINE, Line, begin_line, carry
 from css_estimation.symmetric import Symmetric, product
 
@@ -63,18 +65,19 @@ class SightLine(NamedTuple):
     covariance: Symmetric  # [rad2] of the sight that it began with
     behind_b: Vec3  # [rad] what the sight was off the carried line when it was last seen
     jitter: float  # [rad2] along the axis that is known best; -1: not measured yet
+    unknown: float  # [rad2] of the turn since it began, per axis, that no rate tells
     unseen: float  # [s] since there was a sight
     seen: float  # [s] since it was found
 
 
 _UNKNOWN = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-NO_SIGHT_LINE = SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), -1.0, 0.0, 0.0)
+NO_SIGHT_LINE = SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), -1.0, 0.0, 0.0, 0.0)
 
 
 @kernel
 def interrupted(state: SightLine) -> SightLine:
     """The block is given up; what is known of the sight stays."""
-    return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, state.unseen, state.seen)
+    return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, 0.0, state.unseen, state.seen)
 
 
 @kernel
@@ -84,7 +87,9 @@ def begin_again(state: SightLine, sight: Glimpse, bias_b: Vec3) -> SightLine:
     Args:
         bias_b: of the gyro, as far as it is known [rad/s].
     """
-    return SightLine(begin_line(sight.sun_b, bias_b), sight.covariance, (0.0, 0.0, 0.0), state.jitter, 0.0, state.seen)
+    return SightLine(
+        begin_line(sight.sun_b, bias_b), sight.covariance, (0.0, 0.0, 0.0), state.jitter, 0.0, 0.0, state.seen
+    )
 
 
 @kernel
@@ -101,6 +106,7 @@ def follow_sight(
     rate_b: Vec3,
     bias_b: Vec3,
     largest_error: float,
+    unknown: float,
     sight: Glimpse,
 ) -> tuple[SightLine, Vec3]:
     """One cycle: the block, and what the sight is off the line that the gyro has carried [rad].
@@ -112,17 +118,21 @@ def follow_sight(
         rate_b: of the gyro in this time [rad/s].
         bias_b: its bias, as far as it is known [rad/s].
         largest_error: of a gyro [rad/s].
+        unknown: of the turn in this time, as of `unknown_turn` [rad^2].
     """
-    line = carry(state.line, rate_b, dt)
+    if unknown > LARGEST_UNKNOWN:
+        return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    line, total = carry(state.line, rate_b, dt), state.unknown + unknown
     if not sight.known:
         unseen = state.unseen + dt
         if unseen > _LONGEST_WITHOUT:
-            return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, unseen, 0.0), (0.0, 0.0, 0.0)
-        return SightLine(line, state.covariance, state.behind_b, state.jitter, unseen, state.seen), (0.0, 0.0, 0.0)
+            return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, 0.0, unseen, 0.0), (0.0, 0.0, 0.0)
+        after = SightLine(line, state.covariance, state.behind_b, state.jitter, total, unseen, state.seen)
+        return after, (0.0, 0.0, 0.0)
     if not line.begun:
         seen_for = state.seen + dt
         if seen_for < p.settling:
-            return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, 0.0, seen_for), (0.0, 0.0, 0.0)
+            return SightLine(NO_LINE, _UNKNOWN, (0.0, 0.0, 0.0), state.jitter, 0.0, 0.0, seen_for), (0.0, 0.0, 0.0)
         return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
     behind_b = across(sight.sun_b, subtract(sight.sun_b, line.vector_b))
     jitter = state.jitter
@@ -131,12 +141,12 @@ def follow_sight(
     told = dot(best, product(sight.covariance, best))
     noise = told if jitter < 0.0 else jitter
     wrong = largest_error * (state.unseen + dt)
-    if dot(change, change) > wrong * wrong + _SIGMAS * _SIGMAS * 2.0 * noise:
+    if dot(change, change) > wrong * wrong + _SIGMAS * _SIGMAS * (2.0 * noise + unknown):
         return begin_again(state, sight, bias_b), (0.0, 0.0, 0.0)
     # the difference of two samples; none is taken for noisier than the sight says
     seen = min(0.5 * dot(change, best) * dot(change, best), told)
     jitter = seen if jitter < 0.0 else jitter + _SHARE * (seen - jitter)
-    return SightLine(line, state.covariance, behind_b, jitter, 0.0, state.seen), behind_b
+    return SightLine(line, state.covariance, behind_b, jitter, total, 0.0, state.seen), behind_b
 
 
 @kernel
@@ -175,7 +185,7 @@ def whitening(p: SightLineParameters, state: SightLine, sight: Glimpse, dt: floa
     line = state.line
     (worse, better, _), (larger, smaller, _) = axes_of(state.covariance, sight)
     wandered = 2.0 * p.floor * min(line.time / p.time + line.turn / p.angle, 1.0)
-    usual = wandered + 2.0 * max(state.jitter, 0.0) + rate_noise * dt * line.time
+    usual = wandered + 2.0 * max(state.jitter, 0.0) + rate_noise * dt * line.time + state.unknown
     return (
         scale(1.0 / math.sqrt(usual + max(larger - 2.0 * _TOLD, 0.0)), worse),
         scale(1.0 / math.sqrt(usual + max(smaller - 2.0 * _TOLD, 0.0)), better),

@@ -15,7 +15,7 @@ from css_common.declared import builder
 from css_common.health import SORT_CELL, new_verdicts
 from css_common.kernel import kernel
 from css_common.schema import Values
-from css_common.vectors import Vec3
+from css_common.vectors import Vec3, norm
 from css_estimation.health import aiding_health, cell_health, cell_memory, cell_options, gyroless_sight
 from css_estimation.health.aiding_health import (
     AidingHealthMemory,
@@ -30,6 +30,7 @@ from css_estimation.health.cell_memory import PHASE_LOOKING, CellHealthMemory, C
 from css_estimation.health.cell_options import ENABLED, CellHealthParameters
 from css_estimation.health.cell_search import cost
 from css_estimation.health.gyroless_sight import Glimpse, Gyroless, Led, contradicts, follow_gyro, look, waiting
+from css_estimation.health.rate_checks import unknown_turn
 from css_estimation.sun import heading_dispatch
 from css_estimation.sun.sun_heading import RATE_GYRO, RATE_NONE, Aiding, SunHeading
 from css_estimation.sun.sun_tracking import USE_GYRO, elapsed
@@ -143,7 +144,8 @@ def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWa
     before = state.aiding
     voltages, no_speeds = memory.cells.trusted, memory.aiding.no_speeds
     found = state.cells.track.phase != PHASE_LOOKING
-    sight, glimpse = look(p.sight, before.sight, dt, voltages, no_speeds, aiding.sky, found, state.cells.track.sun_b)
+    checks, found_b = p.aiding.gyro.checks, state.cells.track.sun_b
+    sight, glimpse = look(p.sight, checks, before.sight, dt, voltages, no_speeds, aiding.sky, found, found_b)
     readings = before.health.gyro.readings
     read = readings.spoken and readings.silent == 0.0
     led = follow_gyro(
@@ -158,6 +160,7 @@ def _watch_aiding(p, state, memory, dt: float, aiding: Aiding) -> tuple[AidingWa
         read,
         glimpse,
         p.aiding.gyro.largest_misfit,
+        unknown_turn(checks, norm(readings.rate_b), dt),
     )
     # cells that no Sun explains, whatever the gyro says, are no evidence against it
     suspected = led.strikes > 0 or led.misfit > p.aiding.gyro.largest_misfit
