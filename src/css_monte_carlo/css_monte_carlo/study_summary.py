@@ -3,6 +3,7 @@
 
 from typing import Any
 
+from css_analysis.study_health import health_of_cases
 from css_analysis.study_summary import configuration_objects
 from css_monte_carlo.study import Study
 
@@ -17,6 +18,7 @@ def study_object(study: Study, wall_s: float, cpu_s: float) -> dict[str, Any]:
         "cpu_s": cpu_s,
         "cpu_ns_per_case_step": 1e9 * study.cpu_s / study.flown if study.flown else None,
         "configurations": configuration_objects(study),
+        "health": [health.as_object() for health in health_of_cases(study)],
         "out": str(study.folder),
         "warnings": list(study.warnings),
     }

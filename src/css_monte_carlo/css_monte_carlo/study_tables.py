@@ -9,6 +9,7 @@ from rich.console import Console
 from css_analysis.intervals import beyond_largest
 from css_analysis.quantities import Summary
 from css_analysis.readable_table import ReadableTable
+from css_analysis.study_health import health_of_cases
 from css_analysis.study_summary import summaries_of
 from css_common.drawn_mission import assignments
 from css_monte_carlo.sensitivity import Sensitivity
@@ -25,6 +26,9 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     beyond = beyond_largest(result["cases"])
     if beyond is not None and any(c.over == "max" for row in rows for c in summaries_of(study, row["estimator"])):
         console.print(f"of all cases at most {beyond:.1%} are beyond a max of {result['cases']} (95 % confidence)")
+    for health in health_of_cases(study):
+        for line in health.lines():
+            console.print(line, soft_wrap=True)
     if study.flown:
         console.print(
             f"{result['cases']} cases of {result['steps']} steps in {result['wall_s']:.1f} s wall, "

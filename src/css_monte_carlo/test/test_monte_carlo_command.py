@@ -25,6 +25,7 @@ def test_json_on_the_last_line(tmp_path, capsys, monkeypatch):
         "cpu_s",
         "cpu_ns_per_case_step",
         "configurations",
+        "health",
         "out",
         "warnings",
         "page",

@@ -9,6 +9,7 @@ from css_analysis.flight_metrics import windows_of
 from css_analysis.intervals import Interval
 from css_analysis.quantities import Summary
 from css_analysis.study_criteria import judge
+from css_analysis.study_health import health_of_cases
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import interval_over, rows_of, summaries_of, value_over
 from css_common.mission import mission_from_text
@@ -75,6 +76,9 @@ def _summary(study: StudyRecord) -> Iterator[Block]:
         lines = [[_title(c), *(_told(study, labels, c) for labels in same)] for c in columns]
         yield Table(["over the cases", *map(configuration_label, same)], lines)
     yield _INTERVALS
+    health = [line for configuration in health_of_cases(study) for line in configuration.lines()]
+    if health:
+        yield Listing(health)
     judged = judge(study)
     if judged:
         yield Listing([line for configuration in judged for line in configuration.lines()])
