@@ -296,12 +296,6 @@ def test_an_unscented_filter_has_no_way_to_an_exception(name):
     assert made_library(mission, function).for_target(HOST).contents.code > 1000
 
 
-def test_an_attitude_filter_has_no_way_to_an_exception():
-    mission = load_mission("cubesat_vmm")
-    (function,) = flying_functions(mission, ["attitude_vector"])
-    assert made_library(mission, function).for_target(HOST).contents.code > 1000
-
-
 def test_allocation_is_refused_by_name():
     text = "declare ptr @malloc(i64)\ndefine ptr @f(i64 %n) {\n  %p = call ptr @malloc(i64 %n)\n  ret ptr %p\n}\n"
     with pytest.raises(ExportError, match="malloc"):

@@ -24,8 +24,9 @@ CORRECTION = 0
 _PRODUCT, _GAIN = 1, 2
 
 
-# of a block, said again at each loop over one: without it a compiled loop has a way out by an index out of range
-MOST_ERRORS = 3
+# Of a block. Loops over one go to this end whatever it holds: a compiled index into a tuple has a way out by an
+# exception unless its bound is a constant.
+_MOST_ERRORS = 3
 
 
 class Block(NamedTuple):
@@ -123,10 +124,12 @@ def product_at(covariance, i: int, h: Partials) -> float:
     """Element `i` of P h: covariance of an error with the number that has the derivatives h."""
     p = covariance
     total = p[i, 0] * h.attitude[0] + p[i, 1] * h.attitude[1] + p[i, 2] * h.attitude[2]
-    for k in range(min(h.one.errors, MOST_ERRORS)):
-        total += p[i, h.one.first + k] * h.one.slopes[k]
-    for k in range(min(h.other.errors, MOST_ERRORS)):
-        total += p[i, h.other.first + k] * h.other.slopes[k]
+    for k in range(_MOST_ERRORS):
+        if k < h.one.errors:
+            total += p[i, h.one.first + k] * h.one.slopes[k]
+    for k in range(_MOST_ERRORS):
+        if k < h.other.errors:
+            total += p[i, h.other.first + k] * h.other.slopes[k]
     return total
 
 
@@ -136,10 +139,12 @@ def covariance_of(covariance, a: Partials, b: Partials) -> float:
     total = 0.0
     for k in range(3):
         total += a.attitude[k] * product_at(covariance, ATTITUDE + k, b)
-    for k in range(min(a.one.errors, MOST_ERRORS)):
-        total += a.one.slopes[k] * product_at(covariance, a.one.first + k, b)
-    for k in range(min(a.other.errors, MOST_ERRORS)):
-        total += a.other.slopes[k] * product_at(covariance, a.other.first + k, b)
+    for k in range(_MOST_ERRORS):
+        if k < a.one.errors:
+            total += a.one.slopes[k] * product_at(covariance, a.one.first + k, b)
+    for k in range(_MOST_ERRORS):
+        if k < a.other.errors:
+            total += a.other.slopes[k] * product_at(covariance, a.other.first + k, b)
     return total
 
 
@@ -156,12 +161,14 @@ def innovate(covariance, work, h: Partials, residual: float, variance: float) ->
     for i in range(3):
         innovation -= h.attitude[i] * work[CORRECTION, i]
         s += h.attitude[i] * work[_PRODUCT, i]
-    for k in range(min(h.one.errors, MOST_ERRORS)):
-        innovation -= h.one.slopes[k] * work[CORRECTION, h.one.first + k]
-        s += h.one.slopes[k] * work[_PRODUCT, h.one.first + k]
-    for k in range(min(h.other.errors, MOST_ERRORS)):
-        innovation -= h.other.slopes[k] * work[CORRECTION, h.other.first + k]
-        s += h.other.slopes[k] * work[_PRODUCT, h.other.first + k]
+    for k in range(_MOST_ERRORS):
+        if k < h.one.errors:
+            innovation -= h.one.slopes[k] * work[CORRECTION, h.one.first + k]
+            s += h.one.slopes[k] * work[_PRODUCT, h.one.first + k]
+    for k in range(_MOST_ERRORS):
+        if k < h.other.errors:
+            innovation -= h.other.slopes[k] * work[CORRECTION, h.other.first + k]
+            s += h.other.slopes[k] * work[_PRODUCT, h.other.first + k]
     return innovation, s
 
 
