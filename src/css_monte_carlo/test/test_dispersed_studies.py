@@ -23,7 +23,7 @@ from css_monte_carlo.sensitivity import _indices, sensitivities
 from css_monte_carlo.study import Configuration, run_study
 from css_monte_carlo.worst_case import find_worst
 
-COARSE = ("mission.period=1.0", "mission.duration=120.0")
+COARSE = ("mission.period=1.0", "mission.duration=240.0")
 DISPERSED = (
     "dispersions.dynamics.spacecraft.inertia.each=normal:0.1",
     "dispersions.css_array.noise=uniform:0.0:0.1",
