@@ -365,6 +365,16 @@ def test_another_mathematics_is_named(tmp_path, monkeypatch):
     assert mathematics.differing_functions(["sin", "cos"], HOST, tmp_path) == {"sin": 0.25}
 
 
+@pytest.mark.skipif(why_not(TARGETS["aarch64"]) is not None, reason=str(why_not(TARGETS["aarch64"])))
+def test_erf_of_another_processor_is_named(tmp_path):
+    """glibc makes it with fused products there, and without here."""
+    assert "erf" in mathematics.differing_functions(["erf", "sincos"], TARGETS["aarch64"], tmp_path)
+
+
+def test_a_function_that_nobody_compares_is_told_from_memory_and_runtime():
+    assert mathematics.not_asked(["erf", "memset", "__aeabi_l2d", "sincos", "lgamma"]) == ["lgamma"]
+
+
 @pytest.mark.parametrize(
     ("equal", "largest", "differing", "right"),
     [
