@@ -15,11 +15,9 @@ from css_analysis.flight_metrics import windows_of
 from css_analysis.intervals import share_interval
 from css_analysis.quantities import QUANTITIES, flight_quantities, needed_windows
 from css_analysis.study_record import StudyRecord
-from css_analysis.study_summary import rows_of
+from css_analysis.study_summary import rows_of, some_cases
 from css_common.mission import SHARED, Mission, MissionError, mission_from_text
 from css_common.schema import unknown_name
-
-_NAMED = 5  # cases that a line names
 
 
 class Judged(NamedTuple):
@@ -47,8 +45,7 @@ class Judged(NamedTuple):
         ]
         for criterion, numbers in self.missed.items():
             if numbers:
-                shown = ", ".join(map(str, numbers[:_NAMED])) + (", ..." if len(numbers) > _NAMED else "")
-                lines.append(f"      {criterion} is missed by {len(numbers)}: case {shown}")
+                lines.append(f"      {criterion} is missed by {len(numbers)}: case {some_cases(numbers)}")
         return lines
 
     def as_object(self) -> dict[str, Any]:

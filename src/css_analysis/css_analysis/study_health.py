@@ -8,9 +8,8 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from css_analysis.study_record import StudyRecord
-from css_analysis.study_summary import rows_of
+from css_analysis.study_summary import rows_of, some_cases
 
-_NAMED = 5  # cases that a line names
 _FALSE = {
     "false_isolations": "a cell",
     "false_actuator_isolations": "a wheel or rod",
@@ -64,7 +63,7 @@ class HealthOfCases(NamedTuple):
 
 
 def _cases(numbers: list[int]) -> str:
-    named = ", ".join(map(str, numbers[:_NAMED])) + (", ..." if len(numbers) > _NAMED else "")
+    named = some_cases(numbers)
     return f"{len(numbers)} cases ({named})" if len(numbers) > 1 else f"case {named}"
 
 

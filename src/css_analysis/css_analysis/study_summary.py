@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures of merit of each configuration of a study over its cases."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from css_analysis.intervals import Interval, mean_interval, percentile_interval,
 from css_analysis.quantities import Summary, attitude_summaries, summaries
 from css_analysis.study_record import StudyRecord
 from css_common.mission import mission_from_text
+
+_NAMED = 5  # cases that a line names
 
 
 def configuration_objects(study: StudyRecord) -> list[dict[str, Any]]:
@@ -43,6 +46,11 @@ def rows_of(table: pa.Table, **labels: Any) -> pa.Table:
     for name, value in labels.items():
         table = table.filter(pc.equal(table[name], value))
     return table
+
+
+def some_cases(numbers: Sequence[int]) -> str:
+    """The first few of the cases of which a line tells."""
+    return ", ".join(map(str, numbers[:_NAMED])) + (", ..." if len(numbers) > _NAMED else "")
 
 
 def summaries_of(study: StudyRecord, estimator: str) -> tuple[Summary, ...]:

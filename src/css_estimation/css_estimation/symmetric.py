@@ -67,6 +67,16 @@ def scaled(p: Symmetric, k: float) -> Symmetric:
 
 
 @kernel
+def at_most(p: Symmetric, largest: float) -> Symmetric:
+    """P, shrunk as a whole so that nothing on the diagonal is above `largest`.
+
+    Clipping the diagonal alone can leave no covariance at all.
+    """
+    diagonal = max(p[0], max(p[3], p[5]))
+    return scaled(p, largest / diagonal) if diagonal > largest else p
+
+
+@kernel
 def congruence(m: Mat3, p: Symmetric) -> Symmetric:
     """M P M^T."""
     a = product(p, m[0])

@@ -132,6 +132,17 @@ def trust_again(memory: CellHealthMemory, i: int) -> None:
 
 
 @kernel
+def agreed_long(cell, first_time: float) -> bool:
+    """Whether a cell that is left out has agreed for long enough: twice as long each time that it has failed before.
+
+    Args:
+        first_time: [s] that it takes after the first time.
+    """
+    # a real exponent: numba raises a number to a whole one by a loop that can raise an exception
+    return cell.good >= first_time * 2.0 ** float(cell.times - 1)
+
+
+@kernel
 def forget_scores(memory: CellHealthMemory) -> None:
     """The direction was wrong: forgets what has begun to speak against cells for its sake."""
     for i in range(memory.cells.shape[0]):
@@ -224,8 +235,7 @@ def _judge_on(
         cell.good = 0.0
     elif e.sight == SEEN and max(output, e.high) > SHOWS:
         cell.good += window
-    # a real exponent: numba raises a number to a whole one by a loop that can raise an exception
-    if cell.good >= p.return_time * 2.0 ** float(cell.times - 1):
+    if agreed_long(cell, p.return_time):
         trust_again(memory, i)
 
 

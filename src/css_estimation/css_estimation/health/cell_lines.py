@@ -12,7 +12,7 @@ import math
 
 from css_common.health import EVIDENCE_DEAD
 from css_common.kernel import kernel
-from css_estimation.health.cell_evidence import FREE, MOST_SCORE, SHOWS, hold_for_dead, trust_again
+from css_estimation.health.cell_evidence import FREE, MOST_SCORE, SHOWS, agreed_long, hold_for_dead, trust_again
 from css_estimation.health.cell_expectation import MOST_SQUARED
 from css_estimation.health.cell_memory import CellHealthMemory
 from css_estimation.health.cell_options import CellHealthParameters
@@ -67,5 +67,5 @@ def _see_again(p: CellHealthParameters, memory: CellHealthMemory, i: int) -> Non
     if verdict.held == 0 or verdict.evidence != EVIDENCE_DEAD or not memory.means[i] > SHOWS:
         return
     cell.good += _COUNTS
-    if cell.good >= p.return_time * 2.0 ** float(cell.times - 1):
+    if agreed_long(cell, p.return_time):
         trust_again(memory, i)

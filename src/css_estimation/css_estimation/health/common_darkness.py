@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from css_common.health import EVIDENCE_COMMON, EVIDENCE_DEAD
 from css_common.kernel import kernel
-from css_estimation.health.cell_evidence import begin_evidence, drop_evidence, hold_for_dead, trust_again
+from css_estimation.health.cell_evidence import agreed_long, begin_evidence, drop_evidence, hold_for_dead, trust_again
 from css_estimation.health.cell_expectation import SEEN, SURE, expected
 from css_estimation.health.cell_following import MOST_AT_ONCE
 from css_estimation.health.cell_memory import DIRECTIONS, NO_SIGNAL, PHASE_SETTLED, CellHealthMemory, Darkness, Track
@@ -227,7 +227,7 @@ def see_light_again(p: CellHealthParameters, memory: CellHealthMemory, darkness:
             cell.good += min(window, MOST_AT_ONCE)
         else:
             cell.good = 0.0
-        if cell.good >= _BACK * 2.0 ** float(cell.times - 1):
+        if agreed_long(cell, _BACK):
             trust_again(memory, i)
             back = True
     if not (back and d.lasting):

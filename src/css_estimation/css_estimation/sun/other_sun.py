@@ -19,7 +19,7 @@ from css_estimation.sun.left_open import Span, mirrored, span_of, surely_spans_s
 from css_estimation.sun.lit_cells import Gate, lit_cells, scale_of
 from css_estimation.sun.sun_heading import Covariance
 from css_estimation.sun.sunline_filter import constrain, propagate, update_cells
-from css_estimation.symmetric import Symmetric, add_outer, congruence, product, row_major, scaled
+from css_estimation.symmetric import Symmetric, add_outer, at_most, congruence, product, row_major
 from css_sensors.cells import IN_PLANE
 
 # Two standard deviations: within it a covariance covers the other Sun. Three: within it the Sun may be; odds beyond it
@@ -189,5 +189,4 @@ def with_other(other: OtherSun, sun_b: Vec3, covariance: Symmetric, largest_vari
         p = add_outer(covariance, -0.5 * share * angle * angle, sun_b)
         d = 0.5 * share * angle * angle
         p = (p[0] + d, p[1], p[2], p[3] + d, p[4], p[5] + d)
-    diagonal = max(p[0], max(p[3], p[5]))
-    return row_major(scaled(p, min(1.0, largest_variance / diagonal)))
+    return row_major(at_most(p, largest_variance))

@@ -11,7 +11,7 @@ from css_common.vectors import Vec3, dot, multiply, norm, scale
 from css_estimation.sun.cell_layout import CellLayout, cosine_on, half_view_of, informs, missing_cells, view_margin
 from css_estimation.sun.left_open import surely_spans_space
 from css_estimation.sun.lit_cells import Gate, lit_cells
-from css_estimation.symmetric import Symmetric, add_outer, congruence, product, scaled, subtract_pair, trace
+from css_estimation.symmetric import Symmetric, add_outer, at_most, congruence, product, subtract_pair, trace
 
 _NO_DIRECTION = 1e-6
 
@@ -119,8 +119,4 @@ def constrain(sun_b: Vec3, predicted_b: Vec3, covariance: Symmetric, largest_var
     # far from convergence e^2/2 means nothing, and no axis is more uncertain than the others
     along = 0.5 * min(tangent * tangent, tangent)
     p = add_outer(subtract_pair(covariance, sun_b, h), along, sun_b)
-    diagonal = max(p[0], max(p[3], p[5]))
-    if diagonal > largest_variance:
-        # shrunk as a whole: clipping the diagonal alone can leave no covariance at all
-        p = scaled(p, largest_variance / diagonal)
-    return sun_b, p
+    return sun_b, at_most(p, largest_variance)

@@ -26,7 +26,7 @@ from css_estimation.sun_filter.motion import RATE_BY_GYRO
 from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.reported import LARGEST
 from css_estimation.sun_filter.reported import heading as heading_of
-from css_estimation.symmetric import Symmetric, of_row_major, scaled, trace
+from css_estimation.symmetric import at_most, of_row_major, scaled, trace
 
 _LEAST_GAIN = 0.2
 _LEAST_LIGHT = 0.5
@@ -79,13 +79,6 @@ def _misfit(reading: CellReading, spans: bool) -> float:
 
 
 @kernel
-def _at_most_largest(covariance: Symmetric) -> Symmetric:
-    """Shrunk as a whole to what is reported of a heading of which nothing is known."""
-    diagonal = max(covariance[0], max(covariance[3], covariance[5]))
-    return scaled(covariance, LARGEST / diagonal) if diagonal > LARGEST else covariance
-
-
-@kernel
 def look_beside(
     p: SunFilterParameters,
     state: SunFilterState,
@@ -109,7 +102,7 @@ def look_beside(
     if spans and misfit == 1.0 and not state.other.alive:
         # cells that span space and read what is expected leave no other Sun
         return Beside(no_other_sun(), False, sun_b, covariance)
-    own = _at_most_largest(scaled(of_row_major(covariance), misfit))
+    own = at_most(scaled(of_row_major(covariance), misfit), LARGEST)
     _write_sunlight(p, voltages, m.sunlight)
     rate_b, drift = _turning(state, cycle, reading, aiding)
     variance = p.errors.noise + p.errors.scale + p.errors.cell + p.earth.unknown**2
