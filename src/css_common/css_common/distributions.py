@@ -17,8 +17,8 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from css_common.normal_distribution import normal_quantile
 from css_common.parameter_words import word
-from css_common.random_streams import normal_quantile
 from css_common.schema import shown
 
 FORMS = (

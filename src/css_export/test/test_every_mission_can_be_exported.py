@@ -20,4 +20,6 @@ def test_every_component_that_flies_becomes_code(name):
     codes = [made_library(mission, function).for_target(TARGETS["x86_64"]) for function in flying_functions(mission)]
     assert all(code.contents.code > 1000 for code in codes)
     # else a difference on another processor is laid at the door of others
-    assert not_asked({name for code in codes for name in code.contents.missing}) == []
+    linked = {name for code in codes for name in code.contents.missing}
+    assert not_asked(linked) == []
+    assert not linked & {"cbrt", "erf", "hypot"}  # other bits of glibc on aarch64 and riscv64

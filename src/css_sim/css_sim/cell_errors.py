@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
-from css_common.random_streams import RandomKey, Stream, normal4, normal_quantile, uniform4
+from css_common.normal_distribution import normal_quantile
+from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import real
 from css_common.vectors import Vec3, add, axes_across, multiply_transposed, scale
 

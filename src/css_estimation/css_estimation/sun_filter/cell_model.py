@@ -19,6 +19,7 @@ import math
 from typing import NamedTuple
 
 from css_common.kernel import kernel
+from css_common.normal_distribution import normal_share
 from css_common.vectors import Vec3, add, cross, dot, multiply, multiply_transposed, scale
 from css_environment.albedo import is_blocked, view_cosine
 from css_estimation.sun_filter.calibration import PER_CELL, calibrated, first_state
@@ -117,8 +118,7 @@ def rising(cosine: float, variance: float) -> tuple[float, float, float]:
         return cosine, 1.0, 0.0
     if z < -_SURE:
         return 0.0, 0.0, 0.0
-    share = 0.5 * (1.0 + math.erf(z * math.sqrt(0.5)))
-    density = math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi)
+    share, density = normal_share(z)
     mean = cosine * share + sigma * density
     square = (cosine * cosine + variance) * share + cosine * sigma * density
     return mean, share, max(0.0, square - mean * mean - share * share * variance)
