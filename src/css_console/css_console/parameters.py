@@ -23,6 +23,7 @@ class Parameters:
         values: by node and name.
         described: descriptors of those that can be set in flight, by node and name.
         version: grows with every change.
+        heard: events of all nodes so far.
     """
 
     def __init__(self, node: Node, ask: Ask) -> None:
@@ -34,7 +35,7 @@ class Parameters:
         """
         self.values: dict[str, dict[str, Any]] = {}
         self.described: dict[str, dict[str, ParameterDescriptor]] = {}
-        self.version = 0
+        self.version = self.heard = 0
         self._ask = ask
         self._read: set[str] = set()
         node.create_subscription(ParameterEvent, "/parameter_events", self._note, 100)
@@ -86,6 +87,7 @@ class Parameters:
         self.version += 1
 
     def _note(self, event: ParameterEvent) -> None:
+        self.heard += 1
         known = self.values.get(event.node)
         if known is None:
             return

@@ -29,6 +29,11 @@ class Requests:
         self._waiting: list[_Pending] = []  # for their service to be found
         self._sent: list[tuple[_Pending, Any]] = []
 
+    @property
+    def pending(self) -> bool:
+        """Something was asked that has no answer yet."""
+        return bool(self._waiting or self._sent)
+
     def ask(
         self,
         service: str,

@@ -63,11 +63,27 @@ class Server:
             await runner.cleanup()
 
     async def look_until(self, over: asyncio.Event) -> None:
-        """Looks at the graph again and again, and shows what is new."""
-        while not over.is_set():
-            self._stage.look()
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(over.wait(), 1.0 / LOOKS_PER_S)
+        """Looks at the graph again and again, and shows what is new.
+
+        One timer and no task for a look: each round of the event loop takes the interpreter from the flight's thread.
+        """
+        loop = asyncio.get_running_loop()
+        failures: list[Exception] = []
+
+        def look() -> None:
+            if over.is_set():
+                return
+            try:
+                self._stage.look()
+            except Exception as error:
+                failures.append(error)
+                over.set()
+            loop.call_later(1.0 / LOOKS_PER_S, look)
+
+        look()
+        await over.wait()
+        if failures:
+            raise failures[0]
 
     @web.middleware
     async def _guarded(

@@ -32,8 +32,7 @@ from css_console.taps import TYPES, Taps
 
 _INVENTORY_EVERY_S = 3.0  # wall time [s] between looks around
 _LOOK_EVERY_S = 0.2  # the same before anything flies
-# In a look: a node of the graph tells its health once a second; at first it answers what it is asked.
-_CALLBACKS, _FIRST_CALLBACKS = 4, 24
+_MOST_CALLBACKS = 24  # in a look
 _FACTOR_OVER_S = 2.0
 _LEVELS = {
     DiagnosticStatus.OK: "ok",
@@ -93,6 +92,7 @@ class Watcher:
         self._looked = -math.inf
         self._times: deque[tuple[float, int]] = deque()
         self._diagnostics: dict[str, dict[str, Any]] = {}
+        self._heard = 0  # messages by callbacks
         self._moves = 0  # instants that came since the node that paces time has told of itself
         self._states: dict[str, str] = {}
         self._watched_states: dict[str, Any] = {}
@@ -110,8 +110,7 @@ class Watcher:
 
     def look(self) -> bool:
         """Looks once; whether there is an instant that was not there before."""
-        for _ in range(_FIRST_CALLBACKS if self.frame is None else _CALLBACKS):
-            self._executor.spin_once(timeout_sec=0.0)
+        self._listen()
         self._requests.look()
         now = time.monotonic()
         if now - self._looked > (_INVENTORY_EVERY_S if self.frame is not None else _LOOK_EVERY_S):
@@ -130,6 +129,17 @@ class Watcher:
             self._begin_anew()
         self._show(stamp_ns, now)
         return True
+
+    def _listen(self) -> None:
+        """Lets the node hear what has come, one thing at a time, and once more than there was.
+
+        Each time the interpreter goes to the flight's thread and back, which costs the flight more than what is heard.
+        """
+        for _ in range(_MOST_CALLBACKS):
+            heard = self._heard + self.parameters.heard
+            self._executor.spin_once(timeout_sec=0.0)
+            if self._heard + self.parameters.heard == heard and not self._requests.pending:
+                return
 
     def _look_around(self) -> None:
         found = take_inventory(self._node)
@@ -218,6 +228,7 @@ class Watcher:
     # States of nodes
 
     def _note_diagnostics(self, message: DiagnosticArray) -> None:
+        self._heard += 1
         for status in message.status:
             row = {
                 "node": status.name,
@@ -249,6 +260,7 @@ class Watcher:
         self._requests.ask(f"{node}/get_state", GetState, GetState.Request(), note)
 
     def _note_state(self, node: str, event: TransitionEvent) -> None:
+        self._heard += 1
         self._states[node] = event.goal_state.label
 
     def nodes(self) -> list[dict[str, Any]]:

@@ -198,3 +198,38 @@ def test_one_who_does_not_read_holds_nobody_up_and_costs_no_memory(serving, made
             line.close()
 
     asyncio.run(main())
+
+
+def test_a_look_that_fails_ends_the_server_with_its_reason(made_up_graph):
+    graph = made_up_graph()
+    looks = []
+
+    def look():
+        looks.append(1)
+        if len(looks) == 3:
+            raise RuntimeError("the graph is gone")
+        return False
+
+    graph.look = look
+    server = Server(Stage(graph, Subject("a mission", "flight")), {}, TOKEN)
+
+    async def main():
+        await server.look_until(asyncio.Event())
+
+    with pytest.raises(RuntimeError, match="the graph is gone"):
+        asyncio.run(main())
+    assert len(looks) == 3
+
+
+def test_looks_end_when_they_are_told_to(made_up_graph):
+    graph, over, looks = made_up_graph(), asyncio.Event(), []
+
+    def look():
+        looks.append(1)
+        if len(looks) == 2:
+            over.set()
+        return False
+
+    graph.look = look
+    asyncio.run(Server(Stage(graph, Subject("a mission", "flight")), {}, TOKEN).look_until(over))
+    assert len(looks) == 2
