@@ -57,8 +57,15 @@ def fetch(folder: Path) -> None:
             subprocess.run(["dpkg-deb", "-x", package, root], check=True)
     site = folder / "site-packages"
     if not (site / "numba").exists():
-        uv = ["uv", "pip", "install", "--quiet", "--target", site, "--python-platform", "aarch64-manylinux_2_28"]
-        lock = ["--no-deps", "--only-binary", ":all:", "--require-hashes", "-r", ROOT / "requirements-analysis.lock"]
+        uv = ["uv", "pip", "install", "--quiet", "--target", str(site), "--python-platform", "aarch64-manylinux_2_28"]
+        lock = [
+            "--no-deps",
+            "--only-binary",
+            ":all:",
+            "--require-hashes",
+            "-r",
+            str(ROOT / "requirements-analysis.lock"),
+        ]
         subprocess.run([*uv, "--python-version", "3.11", *lock], check=True)
 
 

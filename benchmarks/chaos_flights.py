@@ -103,7 +103,7 @@ class Reference:
         self.file.write_text(dump_sections({**parameters, "/**": shared}), encoding="utf-8")
         self.mission: Mission = load_mission(self.file)
         bag = folder / "reference"
-        with own_domain(self.mission, None, bag, console), ComposedFlight(self.mission, bag) as flight:
+        with own_domain(self.mission.name, None, bag, console), ComposedFlight(self.mission, bag) as flight:
             result = flight.fly()
         assert not result.failure, result.failure
         assert faulted or not result.notes, result.notes
@@ -139,7 +139,7 @@ def _processes(
     reference: Reference, place: Path, on_poll: Callable[[Supervisor], None], *, alike: bool = False
 ) -> Outcome:
     bag, logs = place / "bag", place / "logs"
-    with own_domain(reference.mission, None, bag, console):
+    with own_domain(reference.mission.name, None, bag, console):
         result = fly_processes(reference.mission, bag, logs, on_poll)
     return reference.judge(result, logs, alike=alike)
 
@@ -305,7 +305,7 @@ def strangers(reference: Reference, place: Path, seed: int) -> Iterator[Outcome]
     del seed
     for topic, (field, factor, ahead) in _FALSE.items():
         bag = place / topic.replace("/", "_")
-        with own_domain(reference.mission, None, bag, console), ComposedFlight(reference.mission, bag) as flight:
+        with own_domain(reference.mission.name, None, bag, console), ComposedFlight(reference.mission, bag) as flight:
             stranger = _stranger(flight, topic, field, factor, ahead)
             result = flight.fly()
             retire(flight.executor, stranger)

@@ -61,7 +61,7 @@ def measured(case: int, cell: int | None) -> tuple[float, float, int]:
 
 def lines(healthy: int, faulted: int) -> Iterator[str]:
     """A line for each flight, and one for each sum."""
-    plans = {"healthy": [(case, None) for case in range(healthy)]}
+    plans: dict[str, list[tuple[int, int | None]]] = {"healthy": [(case, None) for case in range(healthy)]}
     plans["dead"] = [(case, cell) for case in range(faulted) for cell in (0, 1)]
     for label, flights in plans.items():
         results = []

@@ -15,6 +15,7 @@ import sys
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -152,7 +153,7 @@ def fuzz_messages(trial: Trial, count: int, draw: random.Random, missions: list[
         trial.take(
             "messages",
             f"{mission.name}: {name}.{key}: {data.hex()}",
-            lambda heard=listener, k=key, d=data: heard.hear(k, d),
+            partial(listener.hear, key, data),
         )
 
 
@@ -185,7 +186,7 @@ def fuzz_parameters(trial: Trial, count: int, draw: random.Random, nodes: list[C
         tunable = [p.name for p in node.component_type.table() if p.tunable]
         name = draw.choice(tunable if draw.random() < 0.7 else [*node.canonical])
         near = other_value(node.canonical[name], draw) if draw.random() < 0.5 else _value(draw)
-        trial.take("parameters", f"{node.get_name()}.{name}={near!r}", lambda n=node, p=name, v=near: _set(n, p, v))
+        trial.take("parameters", f"{node.get_name()}.{name}={near!r}", partial(_set, node, name, near))
 
 
 def _target(node: ComponentNode, sort: str, draw: random.Random) -> str:
@@ -219,7 +220,11 @@ def fuzz_requests(trial: Trial, count: int, draw: random.Random, nodes: list[Com
                 duration=float(draw.choice((0.0, 0.0, 0.0, 1.0, 1.0, -1.0, np.nan, np.inf, 1e300))),
             )
             call, response = services._inject, InjectFault.Response()
-        trial.take("requests", f"{node.get_name()}: {asked}", lambda c=call, a=asked, r=response: _answer(c(a, r)))
+        trial.take("requests", f"{node.get_name()}: {asked}", partial(_asked, call, asked, response))
+
+
+def _asked(call: Callable[[Any, Any], Any], request: Any, response: Any) -> str:
+    return _answer(call(request, response))
 
 
 def _answer(response: Any) -> str:
@@ -257,7 +262,7 @@ def fuzz_faults(trial: Trial, count: int, draw: random.Random, missions: list[Mi
         base = draw.choice(missions)
         section = "\n".join(_entries(base, draw))
         text = f"/**:\n  ros__parameters:\n    extends: {base.name}\n{section}\n"
-        trial.take("faults", text, lambda t=text, flies=k % 20 == 0: _fly_shortly(t, flies))
+        trial.take("faults", text, partial(_fly_shortly, text, k % 20 == 0))
 
 
 def _fly_shortly(text: str, flies: bool) -> str:
@@ -294,7 +299,7 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=20_000)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
-    with own_domain(load_mission("cubesat_vmm"), None, None, console):
+    with own_domain("cubesat_vmm", None, None, console):
         trial = run(arguments.count, arguments.seed)
     for failure in trial.failures[:50]:
         print(failure)

@@ -19,6 +19,7 @@ import tempfile
 import threading
 import time
 import tty
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,10 @@ def latencies(written: list[int], heard: list[tuple[int, int]]) -> np.ndarray:
     return (arrivals[known] - begins[which[known]]) * 1e-6
 
 
+def _note(arrivals: list[tuple[int, int]], data: bytes) -> None:
+    arrivals.append((stamp_of(data), time.time_ns()))
+
+
 def measure(mission: Mission, rate: float, seconds: float) -> tuple[dict[str, np.ndarray], int]:
     """Latencies [ms] by way, and the number of lines written."""
     heard: dict[str, list[tuple[int, int]]] = {topic: [] for topic in TOPICS}
@@ -151,7 +156,7 @@ def measure(mission: Mission, rate: float, seconds: float) -> tuple[dict[str, np
         node.create_subscription(
             kind,
             topic,
-            lambda data, topic=topic: heard[topic].append((stamp_of(data), time.time_ns())),
+            partial(_note, heard[topic]),
             RECORDER_SUBSCRIPTION,
             raw=True,
         )

@@ -211,7 +211,9 @@ class Trial:
             self._forget_kernels()
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         used = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        noted = {"test": "", "cpu_s": 0.0} | (json.loads(progress.read_text()) if progress.exists() else {})
+        noted: dict[str, Any] = {"test": "", "cpu_s": 0.0} | (
+            json.loads(progress.read_text()) if progress.exists() else {}
+        )
         if process.returncode in (0, 5):  # all passed, or there was none
             return SURVIVED, "", used
         if process.returncode < 0:  # it ran out of processor time, or fell over

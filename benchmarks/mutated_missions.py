@@ -21,6 +21,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -220,11 +221,15 @@ def run(count: int, seed: int, folder: Path, fly_every: int) -> Trial:
         elif kind < 8:
             data = draw.choice(mutations)(draw.choice(files), draw)
             arguments = ["-r", f"__ns:={draw.choice(['/', '/sat1'])}"]
-            trial.read(data, lambda file, a=arguments: one_node(node, file, a), repr((data, arguments)))
+            trial.read(data, partial(one_node, node, arguments=arguments), repr((data, arguments)))
         else:
             texts = overrides(loaded[name], draw)
-            trial.read(b"", lambda _, n=name, t=texts: loaded[n].with_overrides(t), repr((name, texts)), name)
+            trial.read(b"", partial(_changed, loaded[name], texts), repr((name, texts)), name)
     return trial
+
+
+def _changed(mission: Mission, texts: list[str], _: str) -> Mission:
+    return mission.with_overrides(texts)
 
 
 def one_node(node: Any, file: str, arguments: list[str]) -> Mission:

@@ -50,7 +50,7 @@ class Sources:
 
     @cache  # noqa: B019 (lives as long as the program)
     def _imported(self, file: Path) -> tuple[Path, ...]:
-        names = set()
+        names: set[str] = set()
         for node in ast.walk(ast.parse(file.read_bytes())):
             if isinstance(node, ast.Import):
                 names.update(alias.name for alias in node.names)

@@ -172,7 +172,7 @@ def main() -> int:
     watch = Watch(mission.values.mission.duration / arguments.samples)
     with tempfile.TemporaryDirectory(prefix="sunpoint_soak_") as folder:
         bag = None if arguments.no_record else Path(folder) / "bag"
-        with own_domain(mission, None, bag, console):
+        with own_domain(mission.name, None, bag, console):
             if arguments.processes:
                 result = _processes(mission, bag, watch, Path(folder))
             else:
