@@ -14,6 +14,7 @@ from css_common.command import USAGE
 from css_common.component_error import ComponentError
 from css_common.mission_file import MissionError
 from css_common.stepping import Stepper
+from css_export import stand_in as stand_in_of_export
 from css_export.flown import flying_functions
 from css_export.library import made_library, write_library
 from css_export.programs import compiled_program, shared_library
@@ -58,6 +59,7 @@ def files(mission, tmp_path_factory):
         "unnamed": own("unnamed", "", layout=""),
         "other": own("other", "", layout="1"),
         "crashing": own("crashing", "if (steps == 30) { abort(); }"),
+        "hanging": own("hanging", "while (steps == 30) { }"),
     }
 
 
@@ -124,6 +126,21 @@ def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
         step(*arguments)
     for _ in range(2):
         with pytest.raises(ComponentError, match=r"crashing\.so: ended by SIGABRT$"):
+            step(*arguments)
+
+
+def test_a_library_that_does_not_come_back_from_a_step_is_ended(mission, files, monkeypatch):
+    """Nothing else would end it: it hears no interrupt, and the flight that waits for it hears none either."""
+    monkeypatch.setattr(stand_in_of_export, "_PATIENCE_S", 2.0)
+    (node,) = (node for node in mission.nodes if node.name == "ekf")
+    stand_in = stand_ins(mission, [f"ekf={files['hanging']}"])["ekf"]
+    stepper = Stepper(stand_in, node.name, node.canonical, mission.events, mission.epoch_ns)
+    step: Any = vars(stepper.component)["_step"]
+    arguments = functions_of_ekf(mission).sample
+    for _ in range(29):
+        step(*arguments)
+    for _ in range(2):
+        with pytest.raises(ComponentError, match=r"hanging\.so: no answer within 2 s: ended$"):
             step(*arguments)
 
 
