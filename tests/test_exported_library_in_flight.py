@@ -1,15 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """A flight with an exported library in the place of a node's compiled function is the flight without it."""
 
+import hashlib
+import json
+import os
 import shutil
+import signal
 from typing import Any
 
 import pytest
 from flights import messages_by_topic, short_mission
+from rich.console import Console
 
 from css_bringup.commands import fly as fly_command
 from css_bringup.composed import ComposedFlight
+from css_bringup.flight_director import Wish
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_bringup.stand_ins import stand_ins
+from css_bringup.staying import Staying, fly_and_stay
 from css_common.command import USAGE
 from css_common.component_error import ComponentError
 from css_common.mission_file import MissionError
@@ -19,6 +28,8 @@ from css_export.flown import flying_functions
 from css_export.library import made_library, write_library
 from css_export.programs import compiled_program, shared_library
 from css_export.targets import TARGETS
+from css_recording.bag_reader import BagReader
+from css_recording.provenance import STAND_INS
 
 HOST = TARGETS["x86_64"]
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -94,6 +105,32 @@ def test_it_is_the_library_that_flies(mission, files, without, tmp_path):
     own = flown(mission, tmp_path / "bag", [f"ekf={files['own']}"])
     assert own["/ekf/sun_estimate"] != without["/ekf/sun_estimate"]
     assert own["/wheels/torque_command"] != without["/wheels/torque_command"]
+
+
+def test_it_flies_in_a_flight_that_stays_too(mission, files, without, tmp_path):
+    asked = [f"ekf={files['own']}"]
+
+    def end(flown, result):
+        os.kill(os.getpid(), signal.SIGINT)  # noted: it ends the wait for another flight
+        return len(result.notes)
+
+    def components(flown):
+        return stand_ins(flown, asked)
+
+    staying = Staying(lambda flown: tmp_path / "bag", Console(quiet=True), end, stand_ins_of=components)
+    assert fly_and_stay(Wish("okeefe_2013", (), False), mission, staying) == 0
+    assert messages_by_topic(tmp_path / "bag")["/ekf/sun_estimate"] != without["/ekf/sun_estimate"]
+
+
+def test_recording_and_replay_say_that_a_library_flew(mission, files, tmp_path):
+    flown(mission, tmp_path / "bag", [f"ekf={files['own']}"])
+    with BagReader(tmp_path / "bag") as reader:
+        told = json.loads(reader.description[STAND_INS])
+    assert told == {"ekf": {"file": "own.so", "sha256": hashlib.sha256(files["own"].read_bytes()).hexdigest()}}
+    bag = tmp_path / "bag"
+    result = replay(bag, tmp_path / "replay", mission_of_bag(bag, {}, [], None), [parse_request("ekf")], {})
+    (line,) = result.shortcomings
+    assert line.endswith("ekf of own.so flew, here the function of the node")
 
 
 def test_a_library_that_does_not_say_its_structs_is_named(mission, files, tmp_path, capfd):

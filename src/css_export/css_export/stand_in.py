@@ -7,6 +7,7 @@ shared library likewise, by a process that loads it, so that its faults end that
 """
 
 import contextlib
+import hashlib
 import os
 import platform
 import select
@@ -255,6 +256,8 @@ def stand_in(node: Node, file: str) -> type[Component]:
 
     class StandIn(node.component):  # type: ignore[name-defined]
         """A component with a library in it."""
+
+        made_of = {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}  # noqa: RUF012
 
         def __init__(self, *arguments: Any) -> None:
             super().__init__(*arguments)
