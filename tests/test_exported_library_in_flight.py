@@ -152,6 +152,15 @@ def test_a_library_of_another_processor_does_not_fly(mission, files, tmp_path):
         stand_ins(mission, [f"ekf={foreign}"])
 
 
+def test_a_program_with_the_most_significant_byte_first_does_not_fly(mission, files, tmp_path):
+    foreign = tmp_path / "sunpoint_ekf_main"
+    data = bytearray(files["program"].read_bytes())
+    data[5], data[16:20] = 2, b"\x00\x02\x00\x12"  # an executable of SPARC32PLUS, as LEON3's are linked here
+    foreign.write_bytes(data)
+    with pytest.raises(MissionError, match="the most significant byte first: it cannot fly"):
+        stand_ins(mission, [f"ekf={foreign}"])
+
+
 def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
     """Its process ends, not that of the graph, and why is said in a line, again and again."""
     (node,) = (node for node in mission.nodes if node.name == "ekf")

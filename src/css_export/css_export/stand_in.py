@@ -38,6 +38,7 @@ from css_export.recorded_calls import attach
 from css_export.targets import TARGETS
 
 _ELF_PROGRAM, _ELF_SHARED = 2, 3
+_BIG_ENDIAN = b"\2"
 _unnamed: set[Path] = set()  # of which it has been said that they have no number of their structs
 _HERE = platform.machine()
 _PATIENCE_S = 30.0  # for an answer; a flight waits as long for a partner unless its mission says otherwise
@@ -200,6 +201,8 @@ def _elf(file: Path) -> tuple[int, int]:
         ExportError: it is neither.
     """
     head = file.read_bytes()[:20]
+    if head[:4] == b"\x7fELF" and head[5:6] == _BIG_ENDIAN:
+        raise ExportError(f"{file}: of a processor with the most significant byte first: it cannot fly here")
     kind, machine = (int.from_bytes(head[at : at + 2], "little") for at in (16, 18))
     if head[:4] != b"\x7fELF" or kind not in (_ELF_PROGRAM, _ELF_SHARED):
         raise ExportError(f"{file}: expected a shared library or a program")
