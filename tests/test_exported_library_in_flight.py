@@ -1,23 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """A flight with an exported library in the place of a node's compiled function is the flight without it."""
 
+import hashlib
+import json
+import os
 import shutil
+import signal
 from typing import Any
 
 import pytest
 from flights import messages_by_topic, short_mission
+from rich.console import Console
 
 from css_bringup.commands import fly as fly_command
 from css_bringup.composed import ComposedFlight
+from css_bringup.flight_director import Wish
+from css_bringup.replay_bag import mission_of_bag, replay
+from css_bringup.replay_pass import parse_request
 from css_bringup.stand_ins import stand_ins
+from css_bringup.staying import Staying, fly_and_stay
 from css_common.command import USAGE
 from css_common.component_error import ComponentError
 from css_common.mission_file import MissionError
 from css_common.stepping import Stepper
+from css_export import stand_in as stand_in_of_export
 from css_export.flown import flying_functions
 from css_export.library import made_library, write_library
 from css_export.programs import compiled_program, shared_library
 from css_export.targets import TARGETS
+from css_recording.bag_reader import BagReader
+from css_recording.provenance import STAND_INS
 
 HOST = TARGETS["x86_64"]
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
@@ -58,6 +70,7 @@ def files(mission, tmp_path_factory):
         "unnamed": own("unnamed", "", layout=""),
         "other": own("other", "", layout="1"),
         "crashing": own("crashing", "if (steps == 30) { abort(); }"),
+        "hanging": own("hanging", "while (steps == 30) { }"),
     }
 
 
@@ -94,6 +107,32 @@ def test_it_is_the_library_that_flies(mission, files, without, tmp_path):
     assert own["/wheels/torque_command"] != without["/wheels/torque_command"]
 
 
+def test_it_flies_in_a_flight_that_stays_too(mission, files, without, tmp_path):
+    asked = [f"ekf={files['own']}"]
+
+    def end(flown, result):
+        os.kill(os.getpid(), signal.SIGINT)  # noted: it ends the wait for another flight
+        return len(result.notes)
+
+    def components(flown):
+        return stand_ins(flown, asked)
+
+    staying = Staying(lambda flown: tmp_path / "bag", Console(quiet=True), end, stand_ins_of=components)
+    assert fly_and_stay(Wish("okeefe_2013", (), False), mission, staying) == 0
+    assert messages_by_topic(tmp_path / "bag")["/ekf/sun_estimate"] != without["/ekf/sun_estimate"]
+
+
+def test_recording_and_replay_say_that_a_library_flew(mission, files, tmp_path):
+    flown(mission, tmp_path / "bag", [f"ekf={files['own']}"])
+    with BagReader(tmp_path / "bag") as reader:
+        told = json.loads(reader.description[STAND_INS])
+    assert told == {"ekf": {"file": "own.so", "sha256": hashlib.sha256(files["own"].read_bytes()).hexdigest()}}
+    bag = tmp_path / "bag"
+    result = replay(bag, tmp_path / "replay", mission_of_bag(bag, {}, [], None), [parse_request("ekf")], {})
+    (line,) = result.shortcomings
+    assert line.endswith("ekf of own.so flew, here the function of the node")
+
+
 def test_a_library_that_does_not_say_its_structs_is_named(mission, files, tmp_path, capfd):
     flown(mission, tmp_path / "bag", [f"ekf={files['unnamed']}"])
     assert "unnamed.so: has no sunpoint_ekf_layout" in capfd.readouterr().err
@@ -113,6 +152,15 @@ def test_a_library_of_another_processor_does_not_fly(mission, files, tmp_path):
         stand_ins(mission, [f"ekf={foreign}"])
 
 
+def test_a_program_with_the_most_significant_byte_first_does_not_fly(mission, files, tmp_path):
+    foreign = tmp_path / "sunpoint_ekf_main"
+    data = bytearray(files["program"].read_bytes())
+    data[5], data[16:20] = 2, b"\x00\x02\x00\x12"  # an executable of SPARC32PLUS, as LEON3's are linked here
+    foreign.write_bytes(data)
+    with pytest.raises(MissionError, match="the most significant byte first: it cannot fly"):
+        stand_ins(mission, [f"ekf={foreign}"])
+
+
 def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
     """Its process ends, not that of the graph, and why is said in a line, again and again."""
     (node,) = (node for node in mission.nodes if node.name == "ekf")
@@ -124,6 +172,21 @@ def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
         step(*arguments)
     for _ in range(2):
         with pytest.raises(ComponentError, match=r"crashing\.so: ended by SIGABRT$"):
+            step(*arguments)
+
+
+def test_a_library_that_does_not_come_back_from_a_step_is_ended(mission, files, monkeypatch):
+    """Nothing else would end it: it hears no interrupt, and the flight that waits for it hears none either."""
+    monkeypatch.setattr(stand_in_of_export, "_PATIENCE_S", 2.0)
+    (node,) = (node for node in mission.nodes if node.name == "ekf")
+    stand_in = stand_ins(mission, [f"ekf={files['hanging']}"])["ekf"]
+    stepper = Stepper(stand_in, node.name, node.canonical, mission.events, mission.epoch_ns)
+    step: Any = vars(stepper.component)["_step"]
+    arguments = functions_of_ekf(mission).sample
+    for _ in range(29):
+        step(*arguments)
+    for _ in range(2):
+        with pytest.raises(ComponentError, match=r"hanging\.so: no answer within 2 s: ended$"):
             step(*arguments)
 
 

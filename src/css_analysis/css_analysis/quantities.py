@@ -166,7 +166,7 @@ _HEADING_MEAN = Quantity(
 _HEADING_P95 = Quantity(
     "heading_error_p95_deg",
     "deg",
-    "95th percentile of the same angle",
+    "95th percentile of the angle of estimated to true Sun, sunlit, after acquisition",
     heading="heading\nerror\n95 %",
     without_value=_NOT_ACQUIRED,
     measure=EstimatorMeasures.heading_error_p95_deg,
@@ -267,7 +267,7 @@ _ATTITUDE = (
     Quantity(
         "attitude_error_p95_deg",
         "deg",
-        "95th percentile of the same angle",
+        "of attitude filters: 95th percentile of the angle of estimated to true attitude from measures.settled_time on",
         heading="attitude\nerror\n95 %",
         form="{:.3f}",
         without_value=_NOT_SETTLED,
@@ -292,7 +292,8 @@ _ATTITUDE = (
     Quantity(
         "attitude_nees",
         "",
-        "mean normalised error squared of the attitude over the same steps, 3 if the filter is consistent",
+        "of attitude filters: mean normalised error squared of the attitude from measures.settled_time on, 3 if "
+        "consistent",
         heading="attitude\nNEES\n(3)",
         without_value=_NOT_SETTLED,
         measure=EstimatorMeasures.attitude_nees,
@@ -335,7 +336,7 @@ _POINTING = (
     Quantity(
         "pointing_error_sunlit_deg",
         "deg",
-        "the same over all sunlit steps, those before acquisition included",
+        "mean angle of array normal to true Sun over all sunlit steps, those before acquisition included",
         measure=lambda m: m.flight.pointing_error_sunlit_deg(),
         tally=_pointing_sunlit,
     ),
@@ -437,8 +438,17 @@ _FAULTS = (
         SENSORS,
     ),
     _wrong("false_isolations", "isolations of a cell that began while no fault acted on it", CELLS),
-    _wrong("false_actuator_isolations", "the same of wheels and torque rods", WHEELS, RODS),
-    _wrong("falsely_left_sensors", "the same of gyro and magnetometer", SENSORS),
+    _wrong(
+        "false_actuator_isolations",
+        "isolations of a wheel or torque rod that began while no fault acted on it",
+        WHEELS,
+        RODS,
+    ),
+    _wrong(
+        "falsely_left_sensors",
+        "gyro and magnetometer: how often an axis was held for failed while no fault acted on it",
+        SENSORS,
+    ),
 )
 
 
@@ -481,7 +491,7 @@ def _reported(time: float) -> tuple[Quantity, Quantity]:
         Quantity(
             f"rate_knowledge_{minutes}min_deg_s",
             "deg/s",
-            "mean norm of the error of the estimated body rate over the same minute",
+            f"mean norm of the error of the estimated body rate over the minute before {minutes} min from the epoch",
             heading="its\nerror\n",
             form="{:.3f}",
             tally=_mean("reported_knowledge_sum", "reported"),

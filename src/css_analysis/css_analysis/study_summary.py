@@ -21,7 +21,7 @@ def configuration_objects(study: StudyRecord) -> list[dict[str, Any]]:
     """One dictionary per configuration: means over the cases; None for what no case reached.
 
     `interval_95` has the ends of the 95 % interval of each, None for an end that too few cases tell. No cases bound the
-    largest of all: for these it is the number itself, and None.
+    largest of all: for these it is the number itself, and None. `cases_with_value` says of how many cases each one is.
     """
     return [
         {
@@ -34,6 +34,10 @@ def configuration_objects(study: StudyRecord) -> list[dict[str, Any]]:
             },
             "interval_95": {
                 summary.name: interval_over(rows_of(study.cases, **labels), summary)
+                for summary in summaries_of(study, labels["estimator"])
+            },
+            "cases_with_value": {
+                summary.name: cases_with_value(rows_of(study.cases, **labels), summary)
                 for summary in summaries_of(study, labels["estimator"])
             },
         }
@@ -70,6 +74,11 @@ def value_over(cases: pa.Table, summary: Summary) -> float | None:
     if summary.over == "p95":
         return float(np.percentile(known, 95.0))
     return float(np.max(known) if summary.over == "max" else np.mean(known))
+
+
+def cases_with_value(cases: pa.Table, summary: Summary) -> int:
+    """How many cases of a configuration a quantity over them is of: of a share all, else those that have a value."""
+    return int(cases.num_rows if summary.over == "share" else cases.num_rows - cases[summary.of].null_count)
 
 
 def interval_over(cases: pa.Table, summary: Summary) -> Interval:

@@ -47,3 +47,9 @@ def test_what_a_mission_does_not_ask_for_is_not_there():
     assert set(QUANTITIES) == set(flight_quantities(Windows())) | safe_mode
     named = {summary.name for summary in summaries(Windows(report_time=1200.0))}
     assert {"rate_20min_deg_s", "rate_knowledge_20min_deg_s"} <= named
+
+
+def test_each_quantity_is_explained_by_itself():
+    """Tables show those that have a value: the one that another refers to may not stand above it."""
+    table = (*quantities(ALL), *attitude_quantities(ALL))
+    assert [q.name for q in table if "the same" in q.description] == []

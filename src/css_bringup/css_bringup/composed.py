@@ -12,6 +12,7 @@ from rclpy.node import Node
 
 from css_bringup.flight_result import FlightResult, Progress, Stopped, as_flown
 from css_bringup.incidents import node_incidents
+from css_bringup.stand_ins import notes_of
 from css_common.component import Component
 from css_common.executor import create_executor, retire, spin_about_until, spin_until
 from css_common.host import ComponentNode
@@ -80,6 +81,7 @@ class ComposedFlight:
                 self.bag,
                 overwrite=self._overwrite,
                 in_flight=True,
+                notes=notes_of(self._stand_ins),
                 context=self.context,
                 use_global_arguments=False,
             )

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a replay did what was asked of it, and what is behind it if not."""
 
+import json
 from collections.abc import Mapping
 
 from css_bringup.replayed import Replayed
-from css_recording.provenance import software_versions
+from css_recording.provenance import STAND_INS, software_versions
 
 ROUNDING = 1e-6
 """Largest difference of any value that other processors and library versions excuse."""
@@ -19,10 +20,12 @@ def software_apart(recorded: Mapping[str, str]) -> str:
         recorded: what the recording says of its software; nothing: it is taken for another one.
     """
     here = software_versions()
+    flown = [f"{node} of {made['file']}" for node, made in json.loads(recorded.get(STAND_INS, "{}")).items()]
     differing = [key for key in _DECIDES if recorded.get(key) != here.get(key)]
     if not any(key in recorded for key in _DECIDES):
         return "the recording does not say which software flew"
-    return ", ".join(f"{key} {recorded.get(key, 'unknown')} flew, here {here.get(key, 'unknown')}" for key in differing)
+    other = [f"{key} {recorded.get(key, 'unknown')} flew, here {here.get(key, 'unknown')}" for key in differing]
+    return ", ".join([*(f"{library} flew, here the function of the node" for library in flown), *other])
 
 
 def shortcomings(run: Replayed, elsewhere: str) -> list[str]:
@@ -40,7 +43,8 @@ def shortcomings(run: Replayed, elsewhere: str) -> list[str]:
     if comparison is None or comparison.identical:
         return lines
     if comparison.compared == 0 or comparison.unmatched or not is_rounding(run, elsewhere):
-        lines.append(f"{run.label}: {comparison.text()}")
+        why = f"; {elsewhere}" if elsewhere else ""
+        lines.append(f"{run.label}: {comparison.text()}{why}")
     return lines
 
 

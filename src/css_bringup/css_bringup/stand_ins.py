@@ -1,15 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """What flies in the place of the compiled functions of nodes, by packages that this one does not know."""
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from importlib.metadata import entry_points
 
 from css_common.component import Component
 from css_common.mission import Mission
 from css_common.mission_file import MissionError
 from css_common.schema import unknown_name
+from css_recording.provenance import STAND_INS
 
 _GROUP = "sunpoint.stand_ins"
+
+
+def notes_of(components: Mapping[str, type[Component]]) -> dict[str, str]:
+    """What a recording says of the components that stand in for those of nodes; nothing of none."""
+    told = {name: getattr(component, "made_of", {}) for name, component in components.items()}
+    return {STAND_INS: json.dumps(told)} if told else {}
 
 
 def stand_ins(mission: Mission, asked: Iterable[str]) -> dict[str, type[Component]]:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flights one after another in one process and one ROS domain: each begins when `/flight/reset` asks for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from css_bringup.flight_director import FlightDirector, Wish
 from css_bringup.flight_result import FlightResult
 from css_bringup.fly_mission import with_progress
 from css_bringup.report import print_incidents
+from css_common.component import Component
 from css_common.drawn_mission import drawn
 from css_common.executor import spin_until
 from css_common.mission import Mission, load_mission
@@ -29,12 +30,14 @@ class Staying(NamedTuple):
         console: where progress is shown, when it is a terminal.
         conclude: says what came of a flight that was not ended for another one, and gives its exit code.
         begun: is handed each flight before it flies.
+        stand_ins_of: components in the place of those of some nodes of a mission, by name.
     """
 
     bag_of: Callable[[Mission], Path | None]
     console: Console
     conclude: Callable[[Mission, FlightResult], int]
     begun: Callable[[ComposedFlight], object] = lambda flight: None
+    stand_ins_of: Callable[[Mission], Mapping[str, type[Component]]] = lambda mission: {}
 
 
 def mission_of_wish(wish: Wish) -> Mission:
@@ -77,11 +80,17 @@ def _fly_once(
     report(warnings)
     directors: list[FlightDirector] = []
 
+    def checked(further: Wish) -> Mission:
+        meant = mission_of_wish(further)
+        staying.stand_ins_of(meant)  # a library that does not fit it is refused before this flight is ended
+        return meant
+
     def direct(context: Context) -> FlightDirector:
-        directors.append(FlightDirector(context, wish, mission, mission_of_wish))
+        directors.append(FlightDirector(context, wish, mission, checked))
         return directors[0]
 
-    with ComposedFlight(mission, staying.bag_of(mission), guests=(direct,)) as flight:
+    components = staying.stand_ins_of(mission)
+    with ComposedFlight(mission, staying.bag_of(mission), stand_ins=components, guests=(direct,)) as flight:
         staying.begun(flight)
         (director,) = directors
         pace = flight.plant.pace

@@ -8,6 +8,7 @@ import os
 import re
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Never
@@ -18,6 +19,7 @@ USAGE = 2
 INTERRUPTED = 130
 
 _EXITS = {DONE: "done", USAGE: "something asked for is wrong", INTERRUPTED: "interrupted"}
+_AGAIN_S = 0.1  # until an interrupt that was lost comes again
 _RED, _PLAIN = "\x1b[31m", "\x1b[0m"
 
 
@@ -159,7 +161,8 @@ def guarded(
         interrupted: what Ctrl-C is answered with; exit code 130.
     """
     try:
-        return command()
+        with no_lost_interrupts():
+            return command()
     except failed as error:
         complain(prog, _words(error))
         return FAILED
@@ -199,6 +202,31 @@ def plain_interrupts() -> Iterator[None]:
     finally:
         if interrupt is signal.default_int_handler:
             signal.signal(signal.SIGINT, interrupt)
+
+
+@contextmanager
+def no_lost_interrupts() -> Iterator[None]:
+    """Ctrl-C that comes where no exception can be raised, as while the compiler calls back, comes again a little later.
+
+    What is compiled takes seconds without a line of Python, so that it comes there more often than not.
+    """
+    told, timers = sys.unraisablehook, []
+
+    def again(unraisable: Any) -> None:
+        if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+            told(unraisable)
+            return
+        timers.append(threading.Timer(_AGAIN_S, os.kill, (os.getpid(), signal.SIGINT)))
+        timers[-1].daemon = True
+        timers[-1].start()
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = told
+        for timer in timers:
+            timer.cancel()
 
 
 def number(expected: str, accepts: Callable[[float], bool]) -> Callable[[str], float]:

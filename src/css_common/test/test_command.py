@@ -1,6 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every command says of itself and of what is wrong."""
 
+import ctypes
+import signal
+import threading
+
 import pytest
 
 from css_common.command import FAILED, INTERRUPTED, USAGE, command_parser, guarded, number, positive, short_name
@@ -132,3 +136,16 @@ def test_numbers(capsys):
             parser.parse_args([wrong])
         option, text = wrong.split("=")
         assert f"argument {option}: {text} given, expected " in capsys.readouterr().err
+
+
+def test_an_interrupt_that_comes_while_the_compiler_calls_back_is_not_lost(capsys):
+    """Where C calls Python no exception can be raised: it is thrown away, and what was to end goes on."""
+    lost = ctypes.CFUNCTYPE(None)(lambda: signal.raise_signal(signal.SIGINT))
+
+    def compiling():
+        lost()
+        threading.Event().wait(60.0)
+        return 0
+
+    assert guarded("./sunpoint export", compiling, ()) == INTERRUPTED
+    assert capsys.readouterr().err == "export: interrupted\n"

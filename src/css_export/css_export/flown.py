@@ -48,6 +48,7 @@ class Function:
         keeps_state: it returns the state after the cycle and what it gives; else only the latter.
         attribute: of the component, that holds the function which it calls.
         docs: of the arguments, by name.
+        values: of the node, of which the parameters are made; None: not known.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Function:
     attribute: str
     about: str
     docs: dict[str, str] = field(default_factory=dict)
+    values: Values | None = None
 
     def places(self, role: str) -> list[int]:
         """Which arguments have a role."""
@@ -145,6 +147,7 @@ def _sun_estimator(node: Node) -> Iterator[Function]:
             "voltages": "[-] cell outputs; NaN where one is missing",
             "aiding": "what is known beside the cells",
         },
+        values,
     )
 
 
@@ -234,6 +237,7 @@ def _slits(node: Node) -> Iterator[Function]:
         "_take",
         _about(slit_passage.take_pulse.py_func),
         documented(slit_passage.take_pulse.py_func),
+        node.values,
     )
     yield Function(
         f"{node.name}_measure",
@@ -246,6 +250,7 @@ def _slits(node: Node) -> Iterator[Function]:
         "_measure",
         _about(slit_measurement.measure.py_func),
         documented(slit_measurement.measure.py_func),
+        node.values,
     )
 
 
@@ -263,6 +268,7 @@ def _triad(node: Node) -> Iterator[Function]:
         "_attitude",
         _about(kernel.py_func),
         documented(kernel.py_func),
+        node.values,
     )
 
 
@@ -272,7 +278,8 @@ def _stepped(
     told = documented(kernel.py_func) | (docs or {})
     told.setdefault("dt", "[s] since the last step")
     arguments = tuple(inspect.signature(kernel.py_func).parameters)
-    return Function(node.name, node.name, kernel, roles, arguments, sample, True, "_step", _about(node.component), told)
+    about = _about(node.component)
+    return Function(node.name, node.name, kernel, roles, arguments, sample, True, "_step", about, told, node.values)
 
 
 def _about(source: Any) -> str:

@@ -138,7 +138,7 @@ def made_library(mission: Mission, function: Function, mathematics: str = TARGET
     version = version_of(mission, function, mathematics)
     structs = interface.structs
     p = function.sample[function.places(PARAMETERS)[0]]
-    limits = limits_of(structs[PARAMETERS], p)
+    limits = limits_of(structs[PARAMETERS], p, function.values)
     texts = (
         compiled.text,
         step_text(prefix, compiled.symbol),
@@ -170,6 +170,8 @@ def _release() -> str:
 def write_library(library: Library, codes: list[MachineCode], folder: Path) -> list[Path]:
     """Writes sources and objects of a library into a folder; which files.
 
+    What was linked with objects that lay there before is removed.
+
     Raises:
         OSError: they cannot be written.
     """
@@ -185,6 +187,8 @@ def write_library(library: Library, codes: list[MachineCode], folder: Path) -> l
         place.mkdir(exist_ok=True)
         files[place / f"{library.prefix}.o"] = code.object
         files[place / f"lib{library.prefix}.a"] = code.archive
+        for linked in (f"lib{library.prefix}.so", f"{library.prefix}_main"):
+            (place / linked).unlink(missing_ok=True)
     for file, data in files.items():
         write_whole(file, data)
     return list(files)

@@ -3,15 +3,17 @@
 
 A field that is one parameter, as it stands or converted, has the limits of that parameter, converted likewise. Other
 fields hang on several parameters or on sections of the mission: of these it is asked that they are numbers, finite
-where the mission's is.
+where the mission's is. So it is of a field that is declared to be of one parameter and here is of something else:
+checks of a magnetometer are those of a gyro with other numbers in them.
 """
 
 import math
+import struct
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
-from css_common.schema import Parameter, Table
-from css_export.layout import Layout, Scalar, Struct, leaves
+from css_common.schema import Parameter, Table, Values
+from css_export.layout import Layout, Scalar, Struct, leaves, pack
 from css_export.sole_parameter import Only, as_it_stands
 
 REAL, FLAG, WHOLE, SINGLE = 0, 1, 2, 3
@@ -32,14 +34,17 @@ class Limit(NamedTuple):
     declared: bool  # by a parameter's own limits
 
 
-def limits_of(layout: Struct, p: Any) -> list[Limit]:
-    """The limits of a struct of parameters, in the order of its fields.
+def limits_of(layout: Struct, p: Any, values: Values | None = None) -> list[Limit]:
+    """The limits of a struct of parameters, in the order of its fields; `p` keeps them.
 
     Args:
         layout: of the struct.
         p: the parameters of the mission.
+        values: of the node, of which they are made; None: each field is of what it is declared with.
     """
-    return _joined(list(_limits(layout, p, "", 0)))
+    found = _joined(list(_limits(layout, p, values, "", 0)))
+    data = pack(layout, p)
+    return [limit if limit.declared else _also_infinite(limit, data) for limit in found]
 
 
 def whole_numbers(limits: Iterable[Limit], data: bytes | bytearray) -> Iterator[tuple[int, int, int]]:
@@ -63,32 +68,34 @@ def whole_numbers(limits: Iterable[Limit], data: bytes | bytearray) -> Iterator[
                 yield at, value, value
 
 
-def _limits(layout: Layout, value: Any, name: str, at: int) -> Iterator[Limit]:
+def _limits(layout: Layout, value: Any, values: Values | None, name: str, at: int) -> Iterator[Limit]:
     if isinstance(layout, Struct) and hasattr(value, "_fields"):
         sources = getattr(type(value), "_field_defaults", {})
         for field, part in zip(layout.fields, value, strict=True):
             told = f"{name}.{field.name}" if name else field.name
-            bounds = _declared(sources.get(field.name), part)
+            source = sources.get(field.name)
+            bounds = _declared(source, part) if values is None or _is_made_by(source, values, part) else None
             if bounds is not None and isinstance(field.layout, Scalar):
                 unit, low, high = bounds
                 yield Limit(told, unit, low, high, at + field.offset, _kind(field.layout), 1, True)
             else:
-                yield from _limits(field.layout, part, told, at + field.offset)
+                yield from _limits(field.layout, part, values, told, at + field.offset)
         return
     for told, scalar, offset in leaves(layout, name, at):
-        yield Limit(told, "", *_any(scalar, value), offset, _kind(scalar), 1, False)
-
-
-def _any(scalar: Scalar, value: Any) -> tuple[float, float]:
-    if scalar.code == "?":
-        return 0.0, 1.0
-    infinite = isinstance(value, float) and math.isinf(value)
-    bound = math.inf if infinite else _LARGEST
-    return -bound, bound
+        low, high = (0.0, 1.0) if scalar.code == "?" else (-_LARGEST, _LARGEST)
+        yield Limit(told, "", low, high, offset, _kind(scalar), 1, False)
 
 
 def _kind(scalar: Scalar) -> int:
     return {"d": REAL, "f": SINGLE, "?": FLAG, "q": WHOLE}[scalar.code]
+
+
+def _also_infinite(limit: Limit, data: bytes | bytearray) -> Limit:
+    """A limit of numbers without limits of their own, which may be infinite where one of the mission's is."""
+    if limit.kind not in (REAL, SINGLE):
+        return limit
+    numbers = struct.unpack_from(f"<{limit.count}{'d' if limit.kind == REAL else 'f'}", data, limit.offset)
+    return limit._replace(low=-math.inf, high=math.inf) if any(map(math.isinf, numbers)) else limit
 
 
 def _joined(limits: list[Limit]) -> list[Limit]:
@@ -130,6 +137,14 @@ def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
         return None
     unit = parameter.unit if as_it_stands(source) else f"from {parameter.name} [{parameter.unit}]"
     return unit, *bounds
+
+
+def _is_made_by(source: Any, values: Values, value: Any) -> bool:
+    """Whether a field has the value that what it is declared with makes of the values of the node."""
+    try:
+        return bool(source.build(values) == value)
+    except (LookupError, AttributeError, TypeError, ValueError, ArithmeticError):
+        return False  # of a parameter that this node does not have
 
 
 def _bounds(parameter: Parameter[Any], made: Callable[[Any], float]) -> tuple[float, float] | None:

@@ -34,6 +34,7 @@ _CALLED = re.compile(r"(?:call|invoke) .*?@(\"[^\"]+\"|[\w.$]+)\(")
 # or what stands between quotes, to be passed over: a string may end in what looks like the sign of a name
 _LONG_NAME = re.compile(r'(%)("[^"]{200,}"|[\w.$-]{200,})()|"[^"]*"')
 _LONG_LABEL = re.compile(r"""^()("[^"]{200,}"|[\w.$-]{200,})(:)""", re.MULTILINE)
+_UNKNOWN = re.compile(r"'([^']*)' is not a recognized (processor|feature)")
 _WARNED = re.compile(r"stack frame size \((\d+)\) exceeds limit \(\d+\) in function '([^']+)'")
 
 
@@ -74,6 +75,13 @@ def built(name: str, texts: Iterable[str], exported: Iterable[str], target: Targ
         reason = next((line for line in lines if "error:" in line), lines[-1] if lines else "")
         reason = reason or f"LLVM ended with {done.returncode}"
         raise ExportError(f"{name} for {target.name}: {reason}")
+    unknown = _UNKNOWN.search(said)
+    if unknown:
+        # LLVM would go on with the least that has the triple, without its floating point
+        raise ExportError(
+            f"--target {target.triple}:{target.processor}: {unknown[2]} {unknown[1]} is unknown; expected one that "
+            f"LLVM has for {target.triple.partition('-')[0]}, as `clang --target={target.triple} -mcpu=help` lists them"
+        )
     answer = json.loads(done.stdout)
     if "refused" in answer:
         raise ExportError(answer["refused"])

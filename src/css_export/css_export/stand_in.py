@@ -7,11 +7,15 @@ shared library likewise, by a process that loads it, so that its faults end that
 """
 
 import contextlib
+import hashlib
+import os
 import platform
+import select
 import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,9 +38,16 @@ from css_export.recorded_calls import attach
 from css_export.targets import TARGETS
 
 _ELF_PROGRAM, _ELF_SHARED = 2, 3
+_BIG_ENDIAN = b"\2"
 _unnamed: set[Path] = set()  # of which it has been said that they have no number of their structs
 _HERE = platform.machine()
+_PATIENCE_S = 30.0  # for an answer; a flight waits as long for a partner unless its mission says otherwise
+_GRACE_S = 2.0  # of a program to which nothing more can come
 _MACHINES = {62: "x86_64", 183: "aarch64", 243: "riscv64", 40: "armv7"}
+
+
+class _NoAnswer(Exception):
+    """It did not answer in time."""
 
 
 class Processor:
@@ -49,6 +60,7 @@ class Processor:
             ExportError: it cannot be started, or was made for other structs.
         """
         self._file = file
+        self._silent = ""  # why it was ended
         roles = (PARAMETERS_ROLE, STATE_ROLE, INPUT, OUTPUT)
         sizes = [structs[role].size for role in roles]
         try:
@@ -101,15 +113,36 @@ class Processor:
     def _answers(self, asked: bytes, sizes: list[int]) -> list[bytes]:
         pipe_in, pipe_out = self._process.stdin, self._process.stdout
         assert pipe_in is not None and pipe_out is not None
+        given = b""
         try:
             pipe_in.write(asked)
             pipe_in.flush()
-            given = [pipe_out.read(size) for size in sizes]
-        except (OSError, ValueError):  # closed by the other side, or by this one since that ended
-            given = []
-        if [len(data) for data in given] != sizes:
+            given = self._read(pipe_out.fileno(), sum(sizes))
+        except (OSError, ValueError):
+            pass  # closed by the other side, or by this one since that ended
+        except _NoAnswer as error:
+            self._process.kill()
+            self.close()
+            self._silent = str(error)
+        if self._silent:
+            raise ComponentError(f"{self._file}: {self._silent}")
+        if len(given) != sum(sizes):
             raise ComponentError(f"{self._file}: {self._end()}")
-        return given
+        ends = [sum(sizes[: k + 1]) for k in range(len(sizes))]
+        return [given[end - size : end] for end, size in zip(ends, sizes, strict=True)]
+
+    def _read(self, pipe: int, size: int) -> bytes:
+        """So many bytes, or what comes until the other side closes."""
+        poll, until, given = select.poll(), time.monotonic() + _PATIENCE_S, bytearray()
+        poll.register(pipe, select.POLLIN)
+        while len(given) < size:
+            if not poll.poll(1000.0 * max(0.0, until - time.monotonic())):
+                raise _NoAnswer(f"no answer within {_PATIENCE_S:g} s: ended")
+            data = os.read(pipe, size - len(given))
+            if not data:
+                break
+            given += data
+        return bytes(given)
 
     def _end(self) -> str:
         self.close()
@@ -117,12 +150,16 @@ class Processor:
         return f"ended by {signal.Signals(-code).name}" if code < 0 else f"ended with {code}"
 
     def close(self) -> None:
-        """Ends the program, which it does when nothing more can come."""
+        """Ends the program, which it does when nothing more can come, or is ended if it does not."""
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 with contextlib.suppress(OSError):
                     pipe.close()
-        self._process.wait()
+        try:
+            self._process.wait(_GRACE_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
     def __del__(self) -> None:
         if hasattr(self, "_process"):
@@ -164,6 +201,8 @@ def _elf(file: Path) -> tuple[int, int]:
         ExportError: it is neither.
     """
     head = file.read_bytes()[:20]
+    if head[:4] == b"\x7fELF" and head[5:6] == _BIG_ENDIAN:
+        raise ExportError(f"{file}: of a processor with the most significant byte first: it cannot fly here")
     kind, machine = (int.from_bytes(head[at : at + 2], "little") for at in (16, 18))
     if head[:4] != b"\x7fELF" or kind not in (_ELF_PROGRAM, _ELF_SHARED):
         raise ExportError(f"{file}: expected a shared library or a program")
@@ -181,7 +220,10 @@ def refuse_without_step(file: Path, prefix: str) -> None:
     text = "import ctypes, sys\ntry:\n    getattr(ctypes.CDLL(sys.argv[1]), sys.argv[2])\n"
     text += "except (OSError, AttributeError) as error:\n    sys.exit(str(error))\n"
     asked = [sys.executable, "-c", text, str(file.absolute()), f"{prefix}_step"]
-    done = subprocess.run(asked, capture_output=True, check=False)
+    try:
+        done = subprocess.run(asked, capture_output=True, check=False, timeout=_PATIENCE_S)
+    except subprocess.TimeoutExpired as error:
+        raise ExportError(f"{file}: loading it has not ended within {_PATIENCE_S:g} s") from error
     if done.returncode != 0:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         raise ExportError(f"{file}: {said[-1] if said else f'loading it ended with {done.returncode}'}")
@@ -217,6 +259,8 @@ def stand_in(node: Node, file: str) -> type[Component]:
 
     class StandIn(node.component):  # type: ignore[name-defined]
         """A component with a library in it."""
+
+        made_of = {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest()}  # noqa: RUF012
 
         def __init__(self, *arguments: Any) -> None:
             super().__init__(*arguments)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from css_common.command import DONE, USAGE
+from css_common.command import DONE, FAILED, USAGE
 from css_export.commands import export
 
 REFERENCE = Path(__file__).parents[3] / "bags" / "reference"
@@ -74,3 +74,22 @@ def test_the_makefile_builds_the_program(tmp_path, capsys):
     program = folder / "x86_64" / "sunpoint_slit_sun_angle_take_pulse_main"
     assert subprocess.run([str(program)], input=b"", check=True, capture_output=True).stdout == b""
     capsys.readouterr()
+
+
+SLITS = "slit_sun_angle_take_pulse"
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+def test_what_lies_there_of_another_export_is_not_left_in_silence(tmp_path, capsys):
+    """Its objects have other parameters than the header beside them says."""
+    arguments = ["esprit_2006", "--components", "slit_sun_angle", "-o", str(tmp_path)]
+    assert export.main(arguments) == DONE
+    folder = tmp_path / SLITS
+    program = folder / "x86_64" / f"sunpoint_{SLITS}_main"
+    program.write_text("linked with what lies there")
+    capsys.readouterr()
+    assert export.main([*arguments, "--target", "aarch64", "--set", "slits.inclination_deg=31"]) == FAILED
+    said = capsys.readouterr().out
+    assert f"{folder / 'x86_64' / f'libsunpoint_{SLITS}.a'}: of another export" in said
+    assert export.main([*arguments, "--target", "x86_64", "aarch64", "--set", "slits.inclination_deg=31"]) == DONE
+    assert not program.exists()

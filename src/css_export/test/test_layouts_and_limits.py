@@ -4,6 +4,8 @@
 import math
 import shutil
 import subprocess
+from pathlib import Path
+from struct import unpack_from
 from typing import NamedTuple
 
 import numba
@@ -14,13 +16,19 @@ from hypothesis import strategies as st
 
 from css_common.declared import built, computed, made, part, table_of
 from css_common.declared import given as given_by
+from css_common.mission import load_mission
 from css_common.schema import ParameterError, checked_values, choice, flag, integer, real, shaped_values
 from css_export.archive import archive
 from css_export.c_main import state_hash
 from css_export.comments import comments_of
 from css_export.elf import contents
 from css_export.errors import ExportError
+from css_export.flown import PARAMETERS, flying_functions
 from css_export.layout import FLAG, REAL, Struct, layout_of, leaves, pack, struct_of, unpack
+from css_export.limits import FLAG as FLAG_LIMIT
+from css_export.limits import REAL as REAL_LIMIT
+from css_export.limits import SINGLE as SINGLE_LIMIT
+from css_export.limits import WHOLE as WHOLE_LIMIT
 from css_export.limits import limits_of
 from css_export.machine_code import built as machine_code
 from css_export.names import comment, identifier, quoted, snake
@@ -188,6 +196,50 @@ def test_limits_of_what_is_converted():
     assert not keeps("of_two", math.nan)
 
 
+class Twice(NamedTuple):
+    """The same part made of parameters, and of something else."""
+
+    own: Part = part(Part)
+    other: Part = computed(lambda values: Part(-1.0, math.inf))
+    table: np.ndarray = computed(lambda values: np.array([1.0, math.inf]))
+
+
+def test_what_is_made_of_something_else_has_no_limits_of_a_parameter():
+    values = shaped_values(table_of(Twice), checked_values(table_of(Twice), {}))
+    p = built(Twice, values)
+    layout = layout_of(numba.typeof(p), p, "twice", comments_of)
+    assert isinstance(layout, Struct)
+    found = {limit.name: limit for limit in limits_of(layout, p, values)}
+    assert found["own.sigma"].declared
+    assert found["own.falling"].declared
+    assert (found["other.sigma"].declared, found["other.falling"].declared) == (False, False)
+    assert kept(layout, p, found.values()) == []
+    assert kept(layout, p._replace(other=Part(math.nan, 1.0)), found.values()) == ["other.sigma"]
+
+
+def kept(layout, p, limits):
+    """Names of the limits that a struct of parameters does not keep."""
+    data, codes = pack(layout, p), {REAL_LIMIT: "d", FLAG_LIMIT: "?", WHOLE_LIMIT: "q", SINGLE_LIMIT: "f"}
+    return [
+        limit.name
+        for limit in limits
+        if not all(
+            limit.low <= number <= limit.high
+            for number in unpack_from(f"<{limit.count}{codes[limit.kind]}", data, limit.offset)
+        )
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(file.stem for file in (Path(__file__).parents[3] / "config").glob("*.yaml")))
+def test_the_parameters_of_a_mission_keep_their_own_limits(name):
+    """Else none can be changed in flight: whoever asks `check` is told of the one that nobody touched."""
+    for function in flying_functions(load_mission(name)):
+        p = function.sample[function.places(PARAMETERS)[0]]
+        layout = layout_of(numba.typeof(p), p, "params", comments_of)
+        assert isinstance(layout, Struct)
+        assert kept(layout, p, limits_of(layout, p, function.values)) == [], function.name
+
+
 # files
 
 CODE = "define i32 @{0}() {{\n  %r = call i32 @elsewhere()\n  ret i32 %r\n}}\ndeclare i32 @elsewhere()\n"
@@ -257,6 +309,13 @@ def test_targets_by_name_and_by_triple():
     assert target_of("powerpc-unknown-elf:750").processor == "750"
     with pytest.raises(ExportError, match="did you mean cortex-m7"):
         target_of("cortex-m8")
+
+
+def test_a_processor_that_nobody_knows_is_refused():
+    """LLVM makes code for another one, on aarch64 without floating point, and says so where nobody reads it."""
+    with pytest.raises(ExportError, match="processor cortex-a35x is unknown"):
+        machine_code("a", [CODE.format("a")], ["a"], target_of("aarch64-unknown-elf:cortex-a35x"))
+    assert machine_code("a", [CODE.format("a")], ["a"], target_of("aarch64-unknown-elf:cortex-a35")).object
 
 
 def test_the_hash_hangs_on_every_word():

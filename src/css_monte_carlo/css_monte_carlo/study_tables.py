@@ -2,7 +2,7 @@
 """What a terminal shows of a study: its configurations, which parameters matter, the worst flight."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rich.console import Console
 
@@ -26,6 +26,9 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     beyond = beyond_largest(result["cases"])
     if beyond is not None and any(c.over == "max" for row in rows for c in summaries_of(study, row["estimator"])):
         console.print(f"of all cases at most {beyond:.1%} are beyond a max of {result['cases']} (95 % confidence)")
+    for row in rows:
+        for line in _incomplete(row, summaries_of(study, row["estimator"]), result["cases"]):
+            console.print(line, soft_wrap=True)
     for health in health_of_cases(study):
         for line in health.lines():
             console.print(line, soft_wrap=True)
@@ -37,6 +40,18 @@ def print_study(study: Study, result: dict, console: Console) -> None:
     else:
         console.print("this study was complete; nothing was flown")
     console.print(f"study: {study.folder}", soft_wrap=True)
+
+
+def _incomplete(row: dict, columns: Sequence[Summary], cases: int) -> Iterator[str]:
+    """Which figures of a configuration are of some of its cases alone."""
+    by_count: dict[int, list[str]] = {}
+    for column in columns:
+        known = row["cases_with_value"][column.name]
+        if 0 < known < cases:
+            by_count.setdefault(known, []).append(column.name)
+    label = " ".join([row["estimator"], f"gyro {row['gyro']}", *row["overrides"]])
+    for known, names in by_count.items():
+        yield f"only {known} of {cases} cases of {label} have a value of {', '.join(names)}"
 
 
 def _study_table(rows: Sequence[dict], columns: Sequence[Summary]) -> ReadableTable:

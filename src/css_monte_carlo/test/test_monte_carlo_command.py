@@ -44,6 +44,23 @@ def test_json_on_the_last_line(tmp_path, capsys, monkeypatch):
     assert rows == [[name, gyro, noise] for name in ("ekf", "wavg") for gyro in ("on", "off") for noise in ("0", "0.1")]
 
 
+def test_a_mean_over_some_of_the_cases_says_over_how_many(tmp_path, capsys, monkeypatch):
+    """Those that have not acquired the Sun have no error after it: a mean without them looks better than it is."""
+    monkeypatch.setenv("COLUMNS", "100")
+    folder = tmp_path / "s"
+    arguments = ["okeefe_2013", "--duration", "100", "--set", "mission.period=1.0", "--cases", "6"]
+    assert main([*arguments, "--estimators", "wavg", "--out", str(folder), "--json"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (row,) = json.loads(lines[-1])["configurations"]
+    known = row["cases_with_value"]["heading_error_mean_deg"]
+    assert 0 < known < 6
+    assert known == round(6 * row["power_positive_fraction"])
+    assert row["cases_with_value"]["power_positive_fraction"] == 6
+    (told,) = (line for line in lines if line.startswith(f"only {known} of 6 cases of wavg gyro on have a value of "))
+    assert "heading_error_mean_deg" in told and "converging_mean_s" not in told
+    assert f", of {known} of 6 cases" in (folder / "report.html").read_text(encoding="utf-8")
+
+
 def test_a_mission_of_attitude_filters_is_a_study_like_every_other(tmp_path, capsys):
     arguments = ["cubesat_vmm", "--duration", "330", "--cases", "3", "--guess", "20", "--json"]
     assert main([*arguments, "--sweep", "gyro.noise_deg_s=0.03,0.3", "--out", str(tmp_path / "s")]) == 0

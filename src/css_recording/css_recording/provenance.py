@@ -21,6 +21,9 @@ REPLAY_INCIDENTS = "replay_incidents"
 """The same of the replay that made a recording."""
 NOTHING = "none"
 
+STAND_INS = "stand_ins"
+"""Entry of a flight in which a library took the place of compiled functions: JSON with its file and hash by node."""
+
 SEAL = "sha256"
 """Entry that holds the check sums of those beside it."""
 

@@ -10,7 +10,7 @@ Of a topic of the mission the messages of one writer are recorded; those of othe
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -70,6 +70,7 @@ class RecorderNode(Node):
         overwrite: bool = False,
         in_flight: bool = False,
         choice: RecordingChoice | None = None,
+        notes: Mapping[str, str] | None = None,
         context: Context | None = None,
         use_global_arguments: bool = True,
     ) -> None:
@@ -83,6 +84,7 @@ class RecorderNode(Node):
             overwrite: replace a recording that is there.
             in_flight: the mission is being flown and waits for this recorder; only nodes of its graph are recorded.
             choice: what is left out, quality of service, files; default: nothing, the strictest, one.
+            notes: further entries of what the recording says of itself.
             context: ROS context.
             use_global_arguments: False in a composed process, where one command line serves many nodes.
 
@@ -103,7 +105,7 @@ class RecorderNode(Node):
         self._refused: set[str] = set()
         self._waited = 0.0
         try:
-            self._recorder = self._create(mission, bag, overwrite)
+            self._recorder = self._create(mission, bag, overwrite, notes or {})
             for topic in topics:
                 self._expected.setdefault(self.resolve_topic_name(topic), None)
         except BagError:
@@ -192,8 +194,8 @@ class RecorderNode(Node):
             if isinstance(subscription, SoleSubscription):
                 subscription.destroy()
 
-    def _create(self, mission: Mission | None, bag: Path, overwrite: bool) -> FlightRecorder:
-        metadata = software_versions()
+    def _create(self, mission: Mission | None, bag: Path, overwrite: bool, notes: Mapping[str, str]) -> FlightRecorder:
+        metadata = {**software_versions(), **notes}
         recorded: list[Topic] = []
         spacing_ns: dict[str, int] = {}
         limits = BufferLimits()

@@ -22,6 +22,9 @@ _SAME_COS = np.cos(np.radians(3.0))  # labels of cells that look less apart woul
 _MOST_POINTS = 6000  # of a path; a longer one is drawn with wider steps
 _X = {"range": [0.0, 360.0], "tickvals": [0, 60, 120, 180, 240, 300, 360], "constrain": "domain"}
 _Y = {"range": [180.0, 0.0], "tickvals": [0, 30, 60, 90, 120, 150, 180]}
+_OF_CELLS = (
+    "Shades: how many cells see a direction, dark: none. Numbers: where cells look; their lines: how far they see."
+)
 
 
 def body_blocks(log: FlightLog) -> Iterator[Block]:
@@ -44,8 +47,7 @@ def body_blocks(log: FlightLog) -> Iterator[Block]:
         "angle from the array normal [deg]",
         x=_X,
         y=_Y,
-        caption="The top edge is the array normal. Shades: how many cells see a direction, dark: none. Numbers: where "
-        "cells look; their lines: how far they see.",
+        caption=" ".join(["The top edge is the array normal.", *([] if coverage is None else [_OF_CELLS])]),
         height=460,
     )
     if coverage is not None:

@@ -91,7 +91,7 @@ def _title(flight: Flight) -> str:
 def _lead(flight: Flight) -> str:
     log = flight.log
     seconds = max(float(log.time(columns)[-1]) for columns in log.columns())
-    text = f"{log.origin}: {seconds:.1f} s"
+    text = f"{log.origin}: stamps up to {seconds:.1f} s"
     if log.mission is not None:
         mission = log.mission.values.mission
         text = f"{mission.name}, case {mission.case}, seed {mission.seed}. {text}, from {mission.epoch} on"
@@ -147,9 +147,10 @@ def _mission(flight: Flight) -> Iterator[Block]:
     if mission is None:
         yield "The recording holds no mission that is valid here."
     else:
-        yield mapping_table(
-            ("node", "executable"), {node.name: f"{node.package}/{node.executable}" for node in mission.nodes}
-        )
+        if mission.nodes:
+            yield mapping_table(
+                ("node", "executable"), {node.name: f"{node.package}/{node.executable}" for node in mission.nodes}
+            )
         if mission.events:
             yield mapping_table(
                 ("scripted event", "what and when"),

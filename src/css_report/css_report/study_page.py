@@ -11,7 +11,7 @@ from css_analysis.quantities import Summary
 from css_analysis.study_criteria import judge
 from css_analysis.study_health import health_of_cases
 from css_analysis.study_record import StudyRecord
-from css_analysis.study_summary import interval_over, rows_of, summaries_of, value_over
+from css_analysis.study_summary import cases_with_value, interval_over, rows_of, summaries_of, value_over
 from css_common.mission import mission_from_text
 from css_report.blocks import Block, Commands, Listing, Page, Section, Table
 from css_report.comparison import beside
@@ -21,7 +21,7 @@ from css_report.tables import NONE, mapping_table
 
 _INTERVALS = (
     "In brackets: 95 % confidence intervals. Of means by bootstrap, of shares by Clopper and Pearson, of percentiles "
-    "by order statistics; a largest value has none."
+    "by order statistics; a largest value has none. Cases without a value of a quantity are left out of it."
 )
 
 
@@ -95,7 +95,9 @@ def _told(study: StudyRecord, labels: dict[str, Any], summary: Summary) -> str:
     if value is None:
         return NONE
     text = summary.form.format(value)
-    return text if summary.over == "max" else f"{text} ({_ends(interval_over(cases, summary), summary.form)})"
+    text = text if summary.over == "max" else f"{text} ({_ends(interval_over(cases, summary), summary.form)})"
+    known = cases_with_value(cases, summary)
+    return text if known == cases.num_rows else f"{text}, of {known} of {cases.num_rows} cases"
 
 
 def _ends(ends: Interval, form: str) -> str:

@@ -46,6 +46,7 @@ def test_every_part_is_there(page):
     drawn |= {"mode", "cells", "masks", "units", "body-map", "orbit", "illumination", "earthlight"}
     assert set(page.plots) == drawn
     assert page.scripts == 2 and page.outside == []
+    assert any("how many cells see" in text for text in page.texts)
 
 
 def test_a_spike_of_one_sample_is_on_the_page(page, bag):
@@ -175,3 +176,4 @@ def test_a_bare_estimate_has_a_page(tmp_path):
     page = read(html_of(flight_page(read_for_page(bag))))
     assert set(page.plots) == {"body-map"}
     assert any("no truth" in text for text in page.texts)
+    assert not any("how many cells see" in text for text in page.texts), "of what is not drawn"

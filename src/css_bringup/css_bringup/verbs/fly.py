@@ -22,6 +22,7 @@ from css_bringup.stand_ins import stand_ins
 from css_bringup.staying import Staying, fly_and_stay
 from css_common import security
 from css_common.command import FAILED, INTERRUPTED
+from css_common.component import Component
 from css_common.mission import Mission
 from css_recording.errors import BagError
 
@@ -61,8 +62,12 @@ def _stay(arguments: argparse.Namespace, mission: Mission, domain: int) -> int:
         return conclude(flown, result, as_json=arguments.json, with_page=arguments.report)
 
     wish = Wish(arguments.mission, tuple(overrides_of(arguments)), arguments.paused)
+
+    def components_of(flown: Mission) -> dict[str, type[Component]]:
+        return stand_ins(flown, arguments.components)
+
     bag_of = (lambda _: None) if arguments.no_record else default_bag
-    return fly_and_stay(wish, mission, Staying(bag_of, console, end))
+    return fly_and_stay(wish, mission, Staying(bag_of, console, end, stand_ins_of=components_of))
 
 
 def conclude(

@@ -23,7 +23,7 @@ _EXAMPLES = (
     "okeefe_2013 --components ekf --target powerpc-unknown-elf:750 -o flight_code",
 )
 _EXITS = {
-    1: "exported, and something differs from what flew, or could not be run or compiled here",
+    1: "exported, and something differs from what flew, is of another export, or could not be run or compiled here",
     2: "what was asked for is wrong, or cannot be exported",
 }
 

@@ -5,7 +5,7 @@ import argparse
 import json
 import sys
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +52,7 @@ def run(options: argparse.Namespace) -> int:
         write_build_files(library, codes, place)
         write_glue(library, place)
         lines += _link_shared(library, codes, place)
+        lines += _of_another_export(library, codes, place)
         of_library = [Row(library, code) for code in codes]
         rows += of_library
         if options.verify is not None:
@@ -73,6 +74,17 @@ def _link_shared(library: Library, codes: list[MachineCode], place: Path) -> lis
         packed = place / HOST / f"lib{library.prefix}.a"
         shared_library(code.target, packed, packed.with_suffix(".so"))
     return []
+
+
+def _of_another_export(library: Library, codes: list[MachineCode], place: Path) -> Iterator[str]:
+    """What lies in the folder for other targets and is not of this header: of another mission, or older software."""
+    made = {code.target.name for code in codes}
+    for packed in sorted(place.glob(f"*/lib{library.prefix}.a")):
+        if packed.parent.name not in made and library.version.encode("ascii", "replace") not in packed.read_bytes():
+            yield (
+                f"{packed}: of another export, of which {library.prefix}.h no longer is: make it anew with --target "
+                f"{packed.parent.name}, or remove it"
+            )
 
 
 def _targets(names: Iterable[str]) -> list[Target]:
@@ -123,7 +135,9 @@ def _verify(rows: list[Row], options: argparse.Namespace, mission: Mission, plac
                 if row.code.target.name == HOST and calls.steps and row.code.bound.operations is not None:
                     row.counted = most_counted(library, row.code.text, calls)
                 if row.verdict.equal != row.verdict.steps:
-                    row.differing = differing_functions(row.code.contents.missing, row.code.target, place)
+                    with tempfile.TemporaryDirectory() as folder:
+                        linked = row.code.contents.missing
+                        row.differing = differing_functions(linked, row.code.target, Path(folder))
             except ToolError as error:
                 row.why_not = str(error)
     return lines
