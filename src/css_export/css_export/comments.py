@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from css_common.schema import Table
-from css_export.sole_parameter import as_it_stands
+from css_export.sole_parameter import as_it_stands, conversion
 
 
 def comments_of(source: Any) -> Callable[[str], str]:
@@ -46,8 +46,12 @@ def _of_parameter(source: Any) -> str:
     if len(table) != 1:
         return ""
     (parameter,) = table
-    converted = "" if as_it_stands(source) else f"from {parameter.name} "
-    return f"{converted}[{parameter.unit}] {parameter.description}"
+    if as_it_stands(source):
+        return f"[{parameter.unit}] {parameter.description}"
+    made, named = conversion(source), f"{parameter.name} [{parameter.unit}]: {parameter.description}"
+    if made is None:
+        return f"made of {named}"
+    return f"[{made.unit}] {'square of ' if made.power == 2 else ''}{named}"
 
 
 def _annotated(node: ast.ClassDef, comments: dict[int, str]) -> Iterator[tuple[str, str]]:

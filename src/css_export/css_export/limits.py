@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from css_common.schema import Parameter, Table, Values
 from css_export.layout import Layout, Scalar, Struct, leaves, pack
-from css_export.sole_parameter import Only, as_it_stands
+from css_export.sole_parameter import Only, as_it_stands, conversion
 
 REAL, FLAG, WHOLE, SINGLE = 0, 1, 2, 3
 _LARGEST = math.nextafter(math.inf, 0.0)
@@ -135,8 +135,10 @@ def _declared(source: Any, value: Any) -> tuple[str, float, float] | None:
         return None  # it hangs on more than this parameter
     if bounds is None:
         return None
-    unit = parameter.unit if as_it_stands(source) else f"from {parameter.name} [{parameter.unit}]"
-    return unit, *bounds
+    made_in = conversion(source)
+    if as_it_stands(source):
+        return parameter.unit, *bounds
+    return f"made of {parameter.name}" if made_in is None else made_in.unit, *bounds
 
 
 def _is_made_by(source: Any, values: Values, value: Any) -> bool:

@@ -190,10 +190,33 @@ def test_limits_of_what_is_converted():
     assert (LIMITS["way"].low, LIMITS["way"].high) == (0.0, 1.0)
     assert (LIMITS["use"].low, LIMITS["use"].high) == (0.0, 1.0)
     assert LIMITS["inner.falling"].low == 1.0
-    assert LIMITS["inner.sigma"].unit == "from sigma_deg [deg]"
+    assert LIMITS["inner.sigma"].unit == "rad"
+    assert LIMITS["inner.falling"].unit == "made of gain"
     assert not LIMITS["of_two"].declared
     assert not keeps("of_two", math.inf)
     assert not keeps("of_two", math.nan)
+
+
+RATE = real("rate_deg_s", 1.0, "deg/s", "how fast", low=0.0, high=10.0)
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        (given_by(RATE), "[deg/s] how fast"),
+        (made(math.radians, RATE), "[rad/s] rate_deg_s [deg/s]: how fast"),
+        (made(lambda rate: math.radians(rate) ** 2, RATE), "[(rad/s)^2] square of rate_deg_s [deg/s]: how fast"),
+        (made(lambda gain: gain**2, GAIN), "[-] square of gain [-]: share"),
+        (made(lambda gain: 1.0 / gain, GAIN), "made of gain [-]: share"),
+        (made(math.cos, SIGMA), "made of sigma_deg [deg]: error"),
+        (made(("left", "right").index, WAY), "made of way [-]: where to"),
+    ],
+)
+def test_a_member_of_c_has_the_unit_that_it_has_and_not_its_parameters(source, told):
+    class One(NamedTuple):
+        one: float = source
+
+    assert comments_of(One)("one") == told
 
 
 class Twice(NamedTuple):
