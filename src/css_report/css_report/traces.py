@@ -56,14 +56,27 @@ def dots(
 def band(name: str, x: np.ndarray, low: np.ndarray, high: np.ndarray, look: Look, alpha: str = "38") -> list[Trace]:
     """The area between two lines, where both have a number; its borders are drawn: it is seen without colour."""
     known = np.isfinite(low) & np.isfinite(high)
-    x, low, high = (np.asarray(values)[known] for values in (x, low, high))
+    edges = np.flatnonzero(np.diff(known, prepend=False, append=False))
+    traces: list[Trace] = []
+    # an area for each stretch without a gap: one over a gap would show what nobody knows
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        traces += _area(name, x[begin:end], low[begin:end], high[begin:end], look, alpha)
+    return traces
+
+
+def _area(name: str, x: np.ndarray, low: np.ndarray, high: np.ndarray, look: Look, alpha: str) -> list[Trace]:
     rows = np.union1d(kept_rows(low), kept_rows(high))
-    x, low, high = x[rows], low[rows], high[rows]
     edge = {"color": look.colour, "dash": look.dash, "width": 0.7}
-    common: Trace = {"type": "scatter", "mode": "lines", "line": edge, "x": np.asarray(x, np.float64)}
+    common: Trace = {
+        "type": "scatter",
+        "mode": "lines",
+        "line": edge,
+        "x": np.asarray(x[rows], np.float64),
+        "name": name,
+    }
     return [
-        common | {"name": name, "y": np.asarray(low, np.float32), "meta": {"part": True}, "hoverinfo": "skip"},
-        common | {"name": name, "y": np.asarray(high, np.float32), "fill": "tonexty", "fillcolor": look.colour + alpha},
+        common | {"y": np.asarray(low[rows], np.float32), "meta": {"part": True}, "hoverinfo": "skip"},
+        common | {"y": np.asarray(high[rows], np.float32), "fill": "tonexty", "fillcolor": look.colour + alpha},
     ]
 
 

@@ -7,8 +7,11 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from css_report.body_map import path_rows
+from css_report.looks import Look
 from css_report.thinning import kept_rows, merged_spans
+from css_report.traces import band
 
+LOOK = Look("#000000", "solid")
 VALUES = arrays(np.float64, st.integers(1, 400), elements=st.floats(-1e6, 1e6) | st.just(np.nan))
 
 
@@ -57,3 +60,15 @@ def test_a_path_is_drawn_in_small_steps_and_broken_at_gaps():
     steps = np.degrees(np.arccos(np.clip(np.sum(known[1:] * known[:-1], axis=1), -1.0, 1.0)))
     assert np.nanmax(steps) < 0.6 and np.isnan(known).any()
     assert {4999, 6000} <= set(rows.tolist())
+
+
+def test_a_band_has_no_area_over_a_gap():
+    low, high = np.arange(9.0), np.arange(9.0) + 1.0
+    low[3], high[6] = np.nan, np.nan
+    traces = band("5 to 95 %", np.arange(9.0), low, high, LOOK)
+    areas = [(list(below["x"]), list(above["x"])) for below, above in zip(traces[::2], traces[1::2], strict=True)]
+    assert areas == [([0, 1, 2],) * 2, ([4, 5],) * 2, ([7, 8],) * 2]
+    for below, above in zip(traces[::2], traces[1::2], strict=True):
+        np.testing.assert_array_equal(above["y"] - below["y"], 1.0)
+        assert above["fill"] == "tonexty"
+    assert band("none", np.arange(2.0), np.full(2, np.nan), np.ones(2), LOOK) == []
