@@ -116,6 +116,9 @@ def test_an_earth_that_nobody_predicts_is_in_the_error_bars_where_no_shadow_show
         # the mean of that light passes for a dark level, and what is missing of it head-on for a smaller scale
         assert (np.abs(off) / np.where(c.sigma > 0.0, c.sigma, np.inf)).max() < 3.0
         assert not c.observed[:, DARK].any()
+        # in the file they are told with the scales, and it does not say that they are the mission's
+        together = calibration_file(c, "here", None).partition("Told together with others alone")[2]
+        assert all((f"dark of cell {i}" in together) == (c.parameters[i, DARK] != 0.0) for i in range(6))
         assert np.median(np.abs(off[:, DARK]) / c.sigma[:, DARK]) > 0.3  # nor are they a guess that covers anything
 
 
