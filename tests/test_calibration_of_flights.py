@@ -15,13 +15,14 @@ from uncalibrated import (
     mission_of,
     sun_alone,
     true_common,
+    true_parameters,
     without_truth,
 )
 
 from css_bringup.commands import replay as replay_command
 from css_calibration.calibration import ATTITUDE, BATCH, SUN, Calibration, calibrate
 from css_calibration.calibration_result import calibration_file, rows_of, unobserved_combinations
-from css_calibration.cell_fit_model import normals_of
+from css_calibration.cell_fit_model import DARK, normals_of
 from css_calibration.commands import calibrate as command
 from css_calibration.recorded import Recorded
 from css_common.mission_extends import sections_alone
@@ -102,6 +103,23 @@ def test_a_sun_alone_calibrates_and_says_what_it_does_not_know(flights):
     told = ratios(flights[0], c)
     assert len(told) > 20 and np.mean(np.abs(told) <= 3.0) > 0.9
     assert np.degrees(c.after.mean()) < np.degrees(c.before.mean())
+
+
+def test_an_earth_that_nobody_predicts_is_in_the_error_bars_where_no_shadow_shows_dark_levels():
+    faces = ",".join(map(str, np.vstack([np.eye(3), -np.eye(3)]).ravel()))
+    cells = [f"cells.normals={faces}", "cells.field_of_view_deg=180", "cells.clip_normal=0,0,0", "css_array.warp=false"]
+    for case in (1, 2):
+        flight = flown(mission_of(f"mission.case={case}", *cells))
+        sunlit = np.flatnonzero(flight.columns["truth"].illumination > 0.99)
+        c = calibrate(sun_alone(flight).at(sunlit[::2]), curve="cosine", holdout=0.0)
+        off = c.fit.parameters - true_parameters(flight.mission)
+        # the mean of that light passes for a dark level, and what is missing of it head-on for a smaller scale
+        assert (np.abs(off) / np.where(c.sigma > 0.0, c.sigma, np.inf)).max() < 3.0
+        assert not c.observed[:, DARK].any()
+        # in the file they are told with the scales, and it does not say that they are the mission's
+        together = calibration_file(c, "here", None).partition("Told together with others alone")[2]
+        assert all((f"dark of cell {i}" in together) == (c.parameters[i, DARK] != 0.0) for i in range(6))
+        assert np.median(np.abs(off[:, DARK]) / c.sigma[:, DARK]) > 0.3  # nor are they a guess that covers anything
 
 
 def test_a_cell_that_never_saw_the_sun_is_left_alone(flights):

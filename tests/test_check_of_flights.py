@@ -107,6 +107,14 @@ def test_the_vote_of_the_cells_along_rates_finds_one_that_loses_light(flight, sp
     assert any("rates hold the Sun still" in note for note in checked.notes)
 
 
+@pytest.mark.parametrize("kind", ["stuck_high", "drifting"])
+def test_a_liar_has_no_say_in_where_the_sun_was_by_which_others_are_judged(kind):
+    """Cell 2 was called biased: the Sun of the first vote stood where the failing cell had drawn it."""
+    recorded = without_truth(flown(faulted("tumble", 201, kind)))
+    found = verdicts(check(recorded, reference="cells"))
+    assert found == {0: {"stuck_high": "stuck"}.get(kind, kind)}
+
+
 def test_without_rates_the_vote_is_of_each_instant_and_accuses_nobody_wrongly(flight):
     recorded = spoiled(flight.recorded, stuck)
     recorded.gyro_ns, recorded.gyro_b = recorded.gyro_ns[:0], recorded.gyro_b[:0]

@@ -2,7 +2,7 @@
 """A mission with another estimator, another case or without its gyro: as studies fly it, and as a command says it."""
 
 from css_common.mission import Mission, MissionError, Node
-from css_common.sensor_inputs import uses_gyro
+from css_common.sensor_inputs import measures_rates, uses_gyro
 from css_msgs.msg import AttitudeEstimate
 
 
@@ -32,6 +32,19 @@ def configuring_overrides(mission: Mission, estimator: str, gyro: bool) -> list[
     return [*overrides, *_gyro(with_estimator, estimator, gyro)]
 
 
+def flies_with_gyro(mission: Mission, estimator: str | None = None) -> bool:
+    """Whether an estimator flies with a gyro as the mission has it: one is in the graph, and the estimator may use it.
+
+    Of an estimator that has no choice (no parameter `use_gyro`) it is true.
+
+    Raises:
+        MissionError: there is no such estimator.
+    """
+    mission, _ = _with_estimator(mission, estimator)
+    node = mission.node(mission.values.graph.estimator if estimator is None else estimator)
+    return not uses_gyro(node.component) or bool(node.values.use_gyro and measures_rates(mission.nodes))
+
+
 def is_attitude(node: Node) -> bool:
     """Whether a node estimates attitude, by the message that it publishes."""
     return any(output.message_type is AttitudeEstimate for output in node.outputs)
@@ -44,6 +57,8 @@ def is_attitude_filter(mission: Mission, name: str) -> bool:
 
 def _gyro(mission: Mission, estimator: str | None, gyro: bool) -> list[str]:
     name = mission.values.graph.estimator if estimator is None else estimator
+    if not gyro and not flies_with_gyro(mission, name):
+        return []
     if uses_gyro(mission.node(name).component):
         return [f"{name}.use_gyro={'true' if gyro else 'false'}"]
     if not gyro:

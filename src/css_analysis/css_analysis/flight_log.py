@@ -33,6 +33,7 @@ from css_common.link import is_gap
 from css_common.message_columns import Columns, stack
 from css_common.mission import Mission, MissionError, mission_from_text
 from css_common.sections import SPACECRAFT
+from css_common.sensor_inputs import measures_rates
 from css_common.vectors import multiply, row
 from css_msgs.msg import AttitudeEstimate, Faults, Health, SunEstimate, WheelState
 from css_recording.errors import BagError
@@ -182,11 +183,15 @@ class FlightLog:
         return self.mission.values.graph.estimator
 
     def uses_gyro(self, name: str) -> bool:
-        """Whether an estimator may use the gyro, by its parameter; of an unknown node, whether it did."""
+        """Whether an estimator may use a gyro that is there, by its parameter; of an unknown node, whether it did."""
         nodes = self.mission.nodes if self.mission is not None else ()
         for node in nodes:
             if node.name == name and hasattr(node.values, "use_gyro"):
-                return bool(node.values.use_gyro)
+                return bool(node.values.use_gyro and (measures_rates(nodes) or self.went_by_gyro(name)))
+        return self.went_by_gyro(name)
+
+    def went_by_gyro(self, name: str) -> bool:
+        """Whether an estimator ever took its rates from a gyro."""
         if name in self.attitudes:
             return bool(np.any(self.attitudes[name].used & AttitudeEstimate.USED_GYRO))
         return bool(np.any(self.estimates[name].rate_source == SunEstimate.RATE_GYRO))

@@ -17,6 +17,7 @@ from css_bringup.replay_verdict import shortcomings, software_apart
 from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
+from css_common.sensor_inputs import measures_rates
 from css_environment.orbit_checks import recorded_orbit_findings
 from css_estimation.health.coarse_steps import coarse_lines
 from css_recording.bag_folder import free_name
@@ -164,7 +165,7 @@ def replay(
         wall_s = time.perf_counter() - wall
         elsewhere = software_apart(reader.description)
     log = read_flight(bag)
-    runs = [_named(run, figures) for run, figures in _paired(stepping.runs, log)]
+    runs = [_named(run, figures, log) for run, figures in _paired(stepping.runs, log)]
     return ReplayResult(
         source,
         bag,
@@ -207,12 +208,13 @@ def _paired(replayed: Iterable[Replayed], log: FlightLog) -> Iterable[tuple[Repl
     return [(run, figures[run.label]) for run in replayed if run.label in figures]
 
 
-def _named(run: Replayed, figures: Run) -> Run:
+def _named(run: Replayed, figures: Run, log: FlightLog) -> Run:
     # the log knows an estimator by its topic; what it stands for is known here
     use_gyro = getattr(run.node.values, "use_gyro", None)
+    there = log.went_by_gyro(run.label) or (log.mission is not None and measures_rates(log.mission.nodes))
     return figures | {
         "estimator": ":".join(filter(None, (run.node.name, run.changed))),
-        "gyro": "on" if use_gyro in (True, None) else "off",
+        "gyro": "on" if use_gyro is None or (use_gyro and there) else "off",
         "flown": run.comparison is not None,
         "topic": next(iter(run.topics.values())),
         "identical": run.comparison.identical if run.comparison is not None else None,

@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 
 from css_calibration.attitude_track import Track
 from css_calibration.cell_data import CellData
-from css_calibration.cell_fit_model import DARK, EARTH, PER_CELL
+from css_calibration.cell_fit_model import DARK, EARTH, PER_CELL, normals_of
 from css_calibration.noise_model import Noise, noise_of, slow_factor
 from css_calibration.noise_whitening import Errors
 from css_calibration.unknowns import Unknowns
@@ -40,6 +40,8 @@ class Fit:
         unknowns: what was looked for.
         x: (P,) in units of ignorance: of the cells, then of the track.
         covariance: (P, P) of it.
+        of_outputs: (P, P) the part of it by which outputs that are predicted err: without the light of an Earth that
+            nobody predicts, for that is in what is predicted as it is in what was read.
         information: (P, P) normal matrix of the data alone.
         residuals: (M, N) of the outputs [-], NaN where they do not count.
         outliers: (M, N) left out.
@@ -51,6 +53,7 @@ class Fit:
     unknowns: Unknowns
     x: np.ndarray
     covariance: np.ndarray
+    of_outputs: np.ndarray
     information: np.ndarray
     residuals: np.ndarray
     outliers: np.ndarray
@@ -73,7 +76,7 @@ class Fit:
             if self.unknowns.earth:
                 kinds, places = np.append(kinds, EARTH), np.append(places, self.unknowns.count - 1)
             by = slopes[:, i][:, kinds] * scale[places]
-            variance[:, i] = np.einsum("ka,ab,kb->k", by, self.covariance[np.ix_(places, places)], by)
+            variance[:, i] = np.einsum("ka,ab,kb->k", by, self.of_outputs[np.ix_(places, places)], by)
         return variance
 
     @property
@@ -191,16 +194,40 @@ def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: n
         )  # fmt: skip
         x = result.x
         off, expected, earthly, parameters = _off(problem, x, counts)
-        noise = noise_of(off, expected, earthly, counts & ~outliers, data.earth_known)
+        light, counted = expected - parameters[:, DARK], counts & ~outliers
+        noise = noise_of(off, light, earthly, counted, data.intensity > 0.0, data.earth_known)
         if number < _PASSES:
             sigma = np.sqrt(noise.variance(expected, earthly, parameters))
             outliers = counts & (np.abs(off) > OUTLIER * sigma)
     problem = _Problem(data, unknowns, track, counts & ~outliers, noise)
     problem.weigh(x, whole=True)
-    covariance, information, slow = _covariance(problem, x)
+    covariance, of_outputs, information, slow = _covariance(problem, x)
     return Fit(
-        unknowns, x, covariance, information, np.where(counts, -off, np.nan), outliers, noise, slow, float(result.cost)
+        unknowns,
+        x,
+        covariance,
+        of_outputs,
+        information,
+        np.where(counts, -off, np.nan),
+        outliers,
+        noise,
+        slow,
+        float(result.cost),
     )
+
+
+def _earth_patterns(problem: _Problem, x: np.ndarray) -> np.ndarray:
+    """(K, 2 N) where light of an Earth that nobody predicts may lie: on a cell away from the Sun, and on one facing it.
+
+    The two are as good as independent. Where the Sun is overhead a cell sees either it or the lit Earth, which a fit
+    makes a dark level and, of what is then missing head-on, too small a scale; where it is low a cell may see both.
+    """
+    data = problem._placed(x)[0]
+    normals_b = normals_of(data.normals_b, problem.unknowns.parameters(x)[0])
+    facing = np.clip(data.incidence_cosine(normals_b), 0.0, 1.0)[problem.rows, problem.cells]
+    sunlit = data.intensity[problem.rows] > 0.0
+    cells = np.equal.outer(problem.cells, np.arange(data.voltages.shape[1])) & sunlit[:, None]
+    return np.hstack([cells * (1.0 - facing)[:, None], cells * facing[:, None]])
 
 
 def _off(problem: _Problem, x: np.ndarray, counts: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -211,16 +238,17 @@ def _off(problem: _Problem, x: np.ndarray, counts: np.ndarray) -> tuple[np.ndarr
     return np.where(counts, out - data.voltages, 0.0), out, slopes[:, :, EARTH], parameters
 
 
-def _covariance(problem: _Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def _covariance(problem: _Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+    """That of all errors, that of predicted outputs, the normal matrix of the data, and the factor of slow errors."""
     jacobian = problem.of_data(x)
     count = len(problem.rows)
     of_cells, others = jacobian[:count], jacobian[count:]
     information = jacobian.T @ jacobian
     slow = slow_factor(problem.residuals(x)[:count], problem.data.time[problem.rows], problem.cells)
-    middle = slow**2 * of_cells.T @ of_cells + others.T @ others + np.eye(len(x))
-    if problem.noise.unknown > 0.0:
-        whole = np.equal.outer(problem.cells, np.arange(problem.data.voltages.shape[1]))
-        by_light = of_cells.T @ problem.weighed(problem.noise.unknown * whole)
-        middle += by_light @ by_light.T
     inverse = np.linalg.inv(information + np.eye(len(x)))
-    return inverse @ middle @ inverse, information, slow
+    of_outputs = inverse @ (slow**2 * of_cells.T @ of_cells + others.T @ others + np.eye(len(x))) @ inverse
+    covariance = of_outputs
+    if problem.noise.unknown > 0.0:
+        by_light = inverse @ of_cells.T @ problem.weighed(problem.noise.unknown * _earth_patterns(problem, x))
+        covariance = of_outputs + by_light @ by_light.T
+    return covariance, of_outputs, information, slow

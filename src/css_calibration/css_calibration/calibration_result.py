@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_calibration.attitude_track import BIAS, COMMON_SIGMA, FIELD_BIAS, FIELD_SCALE, SOFT_IRON
-from css_calibration.calibration import Calibration
+from css_calibration.calibration import UNTOLD, Calibration
 from css_calibration.cell_fit_model import DARK, GAIN, KAPPA, TILT_1, TILT_2, normals_of
 from css_calibration.unknowns import weak_directions
 from css_common.epochs import format_utc
@@ -164,21 +164,31 @@ def calibration_file(c: Calibration, source: str, extends: str | None) -> str:
             matrix[i, j] = matrix[j, i] = rows[f"soft_iron_{pair}"].value
         shared["magnetometer.measured.matrix"] = _rounded(matrix.ravel(), 7)
     begin, end = (format_utc(int(c.recorded.stamp_ns[k])) for k in (0, -1))
+    left_alone, together = _not_told(c)
     head = [
         f"Calibration of {c.recorded.mission.name} by {source}, {begin} to {end}.",
         f"Reference: {c.reference}; response of the cells: {c.curve}. Scales hold at {c.reference_temperature:g} deg C."
         if "cells.measured.temperature" in shared
         else f"Reference: {c.reference}; response of the cells: {c.curve}.",
-        "What the recording did not tell is as the mission has it:",
-        *(
-            f"  {row.name}{'' if row.cell is None else f' of cell {row.cell}'}"
-            for row in rows_of(c)
-            if not row.observable
-        ),
+        *_named("What the recording did not tell is as the mission has it:", left_alone),
+        *_named("Told together with others alone, so that each by itself is hardly known:", together),
     ]
-    if all(row.observable for row in rows_of(c)):
-        head[-1:] = []
     return "".join(f"# {line}\n" for line in head) + dump_sections({"/**": shared})
+
+
+def _not_told(c: Calibration) -> tuple[list[Row], list[Row]]:
+    """Rows that are not observable: those left as they were, and those whose value is in the file all the same."""
+    column = {name: k for name, k, _, _ in _CELL_ROWS}
+    rows = [row for row in rows_of(c) if not row.observable]
+    together = [row for row in rows if row.cell is not None and c.left[row.cell, column[row.name]] < UNTOLD]
+    return [row for row in rows if row not in together], together
+
+
+def _named(title: str, rows: list[Row]) -> Iterator[str]:
+    if rows:
+        yield title
+    for row in rows:
+        yield f"  {row.name}{'' if row.cell is None else f' of cell {row.cell}'}"
 
 
 def _rounded(values: Any, digits: int) -> list[float]:

@@ -5,10 +5,12 @@
 2. Outputs that no calibration explains, with wide bounds: stretches of faults, and their kinds.
 3. The batch of `calibrate` over what is left, so that scale, tilts and dark levels are no faults.
 4. With its narrow bounds the same again, and what only shows then: noise, ageing, shadows of structure.
+5. Where the cells voted, all of it once more with the vote of those that did not lie, which may acquit others.
 """
 
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +35,9 @@ CELLS = "cells"
 """Reference: the vote of all cells."""
 
 _MOST = {ATTITUDE: 5000, SUN: 5000, BATCH: 1200, CELLS: 4000}
+_NOMINAL = response_of(CURVES["okeefe"])
+_ALONG = "rates hold the Sun still for a minute, over which the cells vote together"
+_AT_ONCE = "no rates that fit the cells: they vote at each instant, and a fault that another Sun explains is not seen"
 _MOST_LIARS = 0.5  # share of the cells that may be left out before the others are believed
 
 
@@ -78,19 +83,67 @@ def check(recorded: Recorded, *, reference: str = "auto", tell: Tell = lambda _:
     around = surroundings_of(thin, with_field=kind == BATCH)
     notes = list(thin.notes)
     sun_b, dcm_bn = _sun(thin, around, kind, tell, notes)
-    data = cell_data(thin, around, sun_b, dcm_bn, response_of(CURVES["okeefe"]), 20.0)
-    if not (data.usable & data.seen).any():
-        raise CalibrationError(f"{recorded.origin}: the Sun is never known to shine on a cell, expected some minutes")
-    tell("outputs that no calibration explains")
-    outputs = judged(thin, data, wide_bounds(data), here)
-    wide = stretches_of(outputs)
-    tell("batch over the others")
-    result, data, closer = _without_liars(thin, data, wide, here)
+    looked = _look(thin, cell_data(thin, around, sun_b, dcm_bn, _NOMINAL, 20.0), here, tell)
+    if kind == CELLS and looked.left_out:
+        # those that lie had their say in where the Sun was, and what they moved it by others seem to err by
+        tell("vote of the others")
+        others, along = _vote(_without(thin, looked.left_out))
+        if along or _ALONG not in notes:
+            sun_b = np.where(np.isfinite(others), others, sun_b)
+            again = _look(thin, cell_data(thin, around, sun_b, dcm_bn, _NOMINAL, 20.0), here, tell)
+            # fewer cells tell the Sun less well: their vote acquits, and accuses nobody
+            looked = again if _cells(again.left_out) <= _cells(looked.left_out) else looked
     found = Found(
-        wide, outputs, stretches_of(closer), closer, frozen_cells(recorded, own), noisy_cells(recorded), spiky(closer)
+        looked.wide,
+        looked.by_wide,
+        stretches_of(looked.closer),
+        looked.closer,
+        frozen_cells(recorded, own),
+        noisy_cells(recorded),
+        spiky(looked.closer),
     )
     tell("noise, ageing and shadows")
-    return Checked(thin, kind, verdicts_of(recorded, thin, data, result, found), notes + _notes(kind))
+    return Checked(thin, kind, verdicts_of(recorded, thin, looked.data, looked.result, found), notes + _notes(kind))
+
+
+class _Looked(NamedTuple):
+    """What is found with the Sun as it is known.
+
+    Attributes:
+        wide, by_wide: stretches of faults by wide bounds, and the outputs by those.
+        result, data: the batch over what is healthy.
+        closer: outputs by its bounds.
+        left_out: stretches that the batch did without.
+    """
+
+    wide: list[Stretch]
+    by_wide: Outputs
+    result: Fit
+    data: CellData
+    closer: Outputs
+    left_out: list[Stretch]
+
+
+def _look(thin: Recorded, data: CellData, own: OwnEvidence, tell: Tell) -> _Looked:
+    if not (data.usable & data.seen).any():
+        raise CalibrationError(f"{thin.origin}: the Sun is never known to shine on a cell, expected some minutes")
+    tell("outputs that no calibration explains")
+    outputs = judged(thin, data, wide_bounds(data), own)
+    wide = stretches_of(outputs)
+    tell("batch over the others")
+    return _Looked(wide, outputs, *_without_liars(thin, data, wide, own))
+
+
+def _cells(stretches: list[Stretch]) -> set[int]:
+    return {one.cell for one in stretches}
+
+
+def _without(thin: Recorded, stretches: list[Stretch]) -> Recorded:
+    """The same with the outputs of stretches missing."""
+    voltages = thin.voltages.copy()
+    for one in stretches:
+        voltages[one.first : one.last + 1, one.cell] = np.nan
+    return replace(thin, voltages=voltages)
 
 
 def _reference(recorded: Recorded, asked: str) -> str:
@@ -121,21 +174,15 @@ def _sun(
         assert thin.sun_b is not None
         return thin.sun_b, thin.dcm_bn
     if kind == CELLS:
-        sun_b = sun_along_rates(thin)
-        if sun_b is not None:
-            notes.append("rates hold the Sun still for a minute, over which the cells vote together")
-            return sun_b, None
-        notes.append(
-            "no rates that fit the cells: they vote at each instant by itself, and a fault that another Sun explains "
-            "is not seen"
-        )
-        return sun_by_cells(thin), None
+        sun_b, along = _vote(thin)
+        notes.append(_ALONG if along else _AT_ONCE)
+        return sun_b, None
     tell("attitude from rates, field and place")
     track, rows = first_track(thin, around)
     part, of_part = thin.at(rows), surroundings_of(thin.at(rows), with_field=True)
     dcm_bn, _ = track.attitudes(np.zeros(track.count))
     sun = np.einsum("kij,kj->ki", dcm_bn, track.sun_n)
-    data = cell_data(part, of_part, sun, dcm_bn, response_of(CURVES["okeefe"]), 20.0)
+    data = cell_data(part, of_part, sun, dcm_bn, _NOMINAL, 20.0)
     unknowns = all_of(data.voltages.shape[1], temperature=False, earth=True, ignorance=Ignorance())
     result = fit(data, unknowns, track)
     dcm_bn, _ = track.attitudes(result.x[unknowns.count :])
@@ -145,10 +192,16 @@ def _sun(
     return all_sun, all_dcm
 
 
+def _vote(thin: Recorded) -> tuple[np.ndarray, bool]:
+    """Sun in b (M, 3) by the vote of the cells, NaN where unknown, and whether they vote along the rates."""
+    sun_b = sun_along_rates(thin)
+    return (sun_by_cells(thin), False) if sun_b is None else (sun_b, True)
+
+
 def _without_liars(
     thin: Recorded, data: CellData, wide: list[Stretch], own: OwnEvidence
-) -> tuple[Fit, CellData, Outputs]:
-    """The batch over what is healthy, and all outputs by its bounds.
+) -> tuple[Fit, CellData, Outputs, list[Stretch]]:
+    """The batch over what is healthy, all outputs by its bounds, and what was left out.
 
     What one cell makes up spoils what all have in common, the Earth, noise and response, and then others seem to lie.
     So the worst one alone is left out at a time, and the others are asked again.
@@ -163,7 +216,7 @@ def _without_liars(
             if stretch.cell not in known:
                 bad[stretch.cell] += stretch.bad
         if not bad or len(known) > _MOST_LIARS * data.voltages.shape[1]:
-            return result, calibrated, outputs
+            return result, calibrated, outputs, left_out
         worst = max(bad, key=lambda cell: bad[cell])
         left_out += [stretch for stretch in stretches_of(outputs) if stretch.cell == worst]
 

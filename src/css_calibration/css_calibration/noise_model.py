@@ -16,6 +16,7 @@ _LEAST = 1e-4
 _BEYOND = 4.0  # standard deviations to which an error counts at most
 _CLOUD_S, _CLOUD_ANGLE = 70.0, math.radians(50.0)  # in which clouds become others: albedo.cloud_time, cloud_angle_deg
 _STRETCH_S = 2.0 * _CLOUD_S
+_FEWEST_AWAY = 5  # outputs by which a stretch has a mean
 
 
 class Noise(NamedTuple):
@@ -62,22 +63,31 @@ def spread(values: np.ndarray) -> float:
 
 
 def noise_of(
-    off: np.ndarray, expected: np.ndarray, earthly: np.ndarray, counts: np.ndarray, earth_known: bool
+    off: np.ndarray, light: np.ndarray, earthly: np.ndarray, counts: np.ndarray, sunlit: np.ndarray, earth_known: bool
 ) -> Noise:
-    """Noise by residuals (M, N) of outputs that count (M, N)."""
+    """Noise by residuals (M, N) of outputs that count (M, N).
+
+    Args:
+        off: (M, N) what is expected less what was read.
+        light: (M, N) what is expected above the dark level: a cell away from the Sun may have a high one, of an Earth
+            that nobody predicts too.
+        earthly: (M, N) slope by the Earth's brightness.
+        sunlit: (M,) whether the Sun shines, or is thought to.
+        earth_known: its light is predicted.
+    """
     clouds = _CLOUDS if earth_known else 0.0
-    dark = counts & (np.abs(expected) < _DARK) & (np.abs(earthly) < 0.2 * _DARK)
-    lit = counts & (expected > _LIT)
+    dark = counts & (np.abs(light) < _DARK) & (np.abs(earthly) < 0.2 * _DARK)
+    lit = counts & (light > _LIT)
     chosen = off[dark] if dark.sum() >= _FEW else off[counts]
     white = max(_LEAST, spread(chosen))
     relative, alike = 0.0, 0.0
     if lit.sum() >= _FEW:
-        cloudy = float(np.mean((clouds * earthly[lit] / expected[lit]) ** 2))
-        own = white**2 * float(np.mean(expected[lit] ** -2))
-        total, shared = _moments(np.where(lit, off / np.where(lit, expected, 1.0), 0.0), lit)
+        cloudy = float(np.mean((clouds * earthly[lit] / light[lit]) ** 2))
+        own = white**2 * float(np.mean(light[lit] ** -2))
+        total, shared = _moments(np.where(lit, off / np.where(lit, light, 1.0), 0.0), lit)
         square = max(total - own - cloudy, shared, 0.0)
         relative, alike = math.sqrt(square), shared / square if square > 0.0 else 0.0
-    return Noise(white, relative, alike, clouds, 0.0 if earth_known else _unknown(off, expected, counts))
+    return Noise(white, relative, alike, clouds, 0.0 if earth_known else _unknown(off, light, counts, sunlit))
 
 
 def _moments(relative: np.ndarray, lit: np.ndarray) -> tuple[float, float]:
@@ -93,16 +103,23 @@ def _moments(relative: np.ndarray, lit: np.ndarray) -> tuple[float, float]:
     return total, max(0.0, float((z.sum(axis=1) ** 2 - squares).sum() / pairs))
 
 
-def _unknown(off: np.ndarray, expected: np.ndarray, counts: np.ndarray) -> float:
-    """Light of an Earth that nobody predicts: how far stretches of what cells read away from the Sun differ."""
-    away = counts & (np.abs(expected) < _DARK)
+def _unknown(off: np.ndarray, light: np.ndarray, counts: np.ndarray, sunlit: np.ndarray) -> float:
+    """Light of an Earth that nobody predicts, 1 sigma: what cells away from the Sun read above their darkest stretch.
+
+    It is never below zero, so that its mean, which a fit takes for a dark level, is as unknown as its changes are.
+    """
+    away = counts & (np.abs(light) < _DARK)
     rows = np.arange(len(off))
     blocks = np.array_split(rows, max(2, min(24, len(rows) // 20)))
-    means = [off[b, i][away[b, i]].mean() for b in blocks for i in range(off.shape[1]) if away[b, i].sum() >= 5]
-    if len(means) < 4:
+    squares = []
+    for i in range(off.shape[1]):
+        told = [(b[away[b, i]], sunlit[b].mean() > 0.5) for b in blocks if away[b, i].sum() >= _FEWEST_AWAY]
+        read = np.array([-off[those, i].mean() for those, _ in told])
+        squares += [(one - read.min()) ** 2 for one, (_, lit) in zip(read, told, strict=True) if lit]
+    if len(squares) < 4:
         return 0.0
-    within = spread(off[away]) / math.sqrt(5.0)
-    return math.sqrt(max(0.0, float(np.mean(np.square(means))) - within**2))
+    within = spread(off[away]) / math.sqrt(_FEWEST_AWAY)
+    return math.sqrt(max(0.0, float(np.mean(squares)) - within**2))
 
 
 def slow_factor(white: np.ndarray, time: np.ndarray, cells: np.ndarray) -> float:

@@ -209,7 +209,7 @@ def _beyond_calibration(thin: Recorded, data: CellData, result: Fit, cell: int) 
     """A cell whose scale or dark level no calibration should have."""
     parameters, unknowns = result.parameters, result.unknowns
     columns = unknowns.column_of()
-    left = np.sqrt(np.diag(result.covariance))
+    left = np.sqrt(np.diag(result.of_outputs))
     begin, end = int(thin.stamp_ns[0]), int(thin.stamp_ns[-1])
     gain, dark = parameters[cell, GAIN], dark_levels(data, result)[cell]
     of_gain = left[columns[cell, GAIN]] * unknowns.ignorance.gain

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inputs that components of several packages have: body rate and magnetic field."""
 
+from collections.abc import Iterable
+
 from sensor_msgs.msg import Illuminance, Imu, MagneticField
 
 from css_common.component import Component, Input
+from css_common.mission import Node
 from css_common.schema import Values
+
+RATES = "gyro/imu"
+"""Topic of the measured body rate."""
 
 FULL_SUN_LUX = 133_100.0
 """Illuminance of the Sun met head-on at 1 AU [lx], by the solar constant of illumination (Allen 2000, 14.9)."""
@@ -24,11 +30,16 @@ def uses_gyro(component: type[Component]) -> bool:
     return any(parameter.name == "use_gyro" for parameter in component.table())
 
 
+def measures_rates(nodes: Iterable[Node]) -> bool:
+    """Whether a node of a graph publishes the body rate that a gyro measures."""
+    return any(output.topic == RATES for node in nodes for output in node.outputs)
+
+
 def gyro_input(values: Values) -> Input:
     """The measured body rate, for a component with the parameter `use_gyro`; the gyro may die."""
     return Input(
         "gyro",
-        "gyro/imu",
+        RATES,
         Imu,
         required=False,
         used=("angular_velocity",),

@@ -182,7 +182,7 @@ def test_of_two_cells_that_explain_the_same_none_is_named():
     assert not out.isolated.any()
 
 
-@pytest.mark.parametrize("decimals", [3, 4])
+@pytest.mark.parametrize("decimals", [2, 3, 4])
 @pytest.mark.parametrize("step_s", [1.0, 60.0])
 def test_a_gyro_in_rounded_telemetry_is_not_stuck(step_s, decimals):
     random = np.random.default_rng(13)

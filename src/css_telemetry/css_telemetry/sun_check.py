@@ -37,14 +37,33 @@ def sun_check(telemetry: Telemetry, states: TrueStates) -> SunCheck | None:
     step = max(1, len(picked) // _MOST_LINES)
     angles = []
     for row, true in zip(picked[::step], sun_b[::step], strict=True):
-        outputs = telemetry.cells[row]
-        lit = np.flatnonzero(outputs > _LIT)
-        moments = normals[lit].T @ normals[lit]
-        values = np.linalg.eigvalsh(moments)
-        if len(lit) < 3 or values[0] < _WELL_SPREAD * values[2]:
-            continue
-        found = np.linalg.solve(moments, normals[lit].T @ outputs[lit])
-        angles.append(np.arctan2(np.linalg.norm(np.cross(found, true)), found @ true))
+        found = lit_direction(normals, telemetry.cells[row])
+        if found is not None:
+            angles.append(np.arctan2(np.linalg.norm(np.cross(found, true)), found @ true))
     if len(angles) < _LEAST_LINES:
         return None
     return SunCheck(float(np.degrees(np.median(angles))), len(angles))
+
+
+def lit_direction(normals: np.ndarray, outputs: np.ndarray) -> np.ndarray | None:
+    """(3,) along the Sun that lit cells show by least squares; None: they tell no direction.
+
+    A cell that looks away from what all of them show is lit by the Earth: on six faces it would pull the Sun of the
+    opposite face to half of what that reads. The one that looks away most is left out at a time.
+
+    Args:
+        normals: (N, 3).
+        outputs: (N,) [-], NaN where missing.
+    """
+    lit = np.flatnonzero(outputs > _LIT)
+    while len(lit) >= 3:
+        moments = normals[lit].T @ normals[lit]
+        values = np.linalg.eigvalsh(moments)
+        if values[0] < _WELL_SPREAD * values[2]:
+            return None
+        found: np.ndarray = np.linalg.solve(moments, normals[lit].T @ outputs[lit])
+        cosines = normals[lit] @ found
+        if cosines.min() > 0.0:
+            return found
+        lit = np.delete(lit, np.argmin(cosines))
+    return None

@@ -10,6 +10,7 @@ from css_common.component import Finding, Plant, Smoothing
 from css_common.mission import Node
 from css_common.schema import Values
 from css_common.sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
+from css_common.sensor_inputs import measures_rates
 from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
 from sunpoint_control.wheel_allocation import pseudo_inverse
 
@@ -81,7 +82,7 @@ def loop_model(values: Values, graph: Mapping[str, Node]) -> LoopModel:
     """The loop around a control with these values, as the graph closes it."""
     estimator = graph.get(values.graph.estimator)
     use_gyro = bool(estimator is None or getattr(estimator.values, "use_gyro", True))
-    measured = not graph or any(output.topic == "gyro/imu" for other in graph.values() for output in other.outputs)
+    measured = not graph or measures_rates(graph.values())
     simulated = any(issubclass(other.component, Plant) for other in graph.values())
     axes = np.asarray(values.wheels.axes)
     return LoopModel(

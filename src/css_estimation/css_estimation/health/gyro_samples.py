@@ -29,6 +29,7 @@ from css_estimation.health.rate_checks import (
     has_noise,
     longest_run,
     restless,
+    step_seen,
 )
 
 _SPELLS = 2  # of zeros that make an axis an intermittent one
@@ -49,14 +50,16 @@ def _kind(p: RateChecks, axis, status: int) -> int:
 
 
 @kernel
-def _accuse(p: RateChecks, axis, row, status: int, step: int) -> None:
+def _accuse(p: RateChecks, axis, row, status: int, step: int, resolution: float) -> None:
     """Holds an axis for failed by its samples, or names anew what has failed already."""
     kind = _kind(p, axis, status)
     if row.held != 0:
         if row.kind != kind:
             rename(row, kind)
     elif status == SAMPLE_STUCK:
-        hold(row, kind, EVIDENCE_STUCK, float(axis.equal), float(longest_run(p, axis) - 1), step - axis.equal)
+        hold(
+            row, kind, EVIDENCE_STUCK, float(axis.equal), float(longest_run(p, axis, resolution) - 1), step - axis.equal
+        )
     elif status == SAMPLE_RANGE:
         hold(row, kind, EVIDENCE_RANGE, axis.gap, p.patience, step)
     elif status == SAMPLE_SPIKY:
@@ -79,10 +82,10 @@ def check_samples(p: RateChecks, axes, verdicts, dt: float, step: int, gyro_b: V
     Returns:
         The reading, with the last good value where a spike or no number was; READING_*.
     """
-    speed = norm(rate_b)
+    speed, resolution = norm(rate_b), step_seen(axes)
     reading = READING_GOOD
     for i in range(3):
-        status = check_sample(p, axes[i], dt, gyro_b[i], speed)
+        status = check_sample(p, axes[i], dt, gyro_b[i], speed, resolution)
         if status == SAMPLE_JUMPED:
             reading = max(reading, READING_JUMPED)
         elif status == SAMPLE_RANGE and (axes[i].seen == 0 or axes[i].gap <= p.patience):
@@ -91,5 +94,5 @@ def check_samples(p: RateChecks, axes, verdicts, dt: float, step: int, gyro_b: V
             continue
         elif status in (SAMPLE_STUCK, SAMPLE_RANGE, SAMPLE_SPIKY, SAMPLE_NOISY):
             reading = READING_FAILED
-            _accuse(p, axes[i], verdicts[i], status, step)
+            _accuse(p, axes[i], verdicts[i], status, step, resolution)
     return (axes[0].good, axes[1].good, axes[2].good), reading

@@ -6,7 +6,8 @@ spike    farther from the last good sample than noise and torques can bring it: 
          ones agree with it, it was a jump: the body cannot have done it, so the error of the gyro has changed by it
 stuck    so often the very same number that noise and rounding would show it once in 1e9 runs, and once in as many of
          this axis, by how often its samples have repeated so far: telemetry may be rounded more coarsely than the
-         sensor; judged once an axis of the sensor has shown noise
+         sensor, which shows in the smallest change of any axis, and a body at rest then reads the same for ever; judged
+         once an axis of the sensor has shown noise
 noise    squared differences of successive samples, averaged, beyond what noise and torques make of them
 
 A body without torque changes its rate by |J^-1 (w x J w)| < |w|^2 at most, whatever its moments of inertia, which add
@@ -20,6 +21,7 @@ import numpy as np
 
 from css_common.declared import computed, given, made, table_of
 from css_common.kernel import kernel
+from css_common.normal_distribution import normal_share
 from css_common.schema import real
 
 _FALSE_ALARM = 1e-9  # of one run of samples
@@ -27,6 +29,9 @@ _LOG_FALSE_ALARM = math.log(_FALSE_ALARM)
 _PRIOR = 2.0  # samples that repeat, and as many that do not, that an axis is thought to have shown
 _FEWEST_EQUAL = 5  # a message that came twice or thrice is not a stuck axis
 _MOST_EQUAL = 1000
+_FOR_EVER = 1_000_000_000  # samples
+_COARSE = 2.0  # standard deviations of noise in a step
+_FARTHEST = 7.0  # of those, for which a share is known
 _AGREEING = 4  # samples in a row make a jump
 _SHARE = 1.0 / 20.0  # of a new sample in averages
 _SIGMAS = 6.0
@@ -57,6 +62,7 @@ GYRO_AXIS = np.dtype(
         ("jumped", np.int64),  # in this cycle
         ("changes", np.int64),  # samples that were not as the one before
         ("repeats", np.int64),  # samples that were, of no run more than may be usual
+        ("least_change", np.float64),  # [rad/s] smallest one so far; 0: none
     ],
     align=True,
 )
@@ -71,14 +77,31 @@ def gamma_quantile(degrees_of_freedom: float, sigmas: float) -> float:
     return (1.0 - k + sigmas * math.sqrt(k)) ** 3
 
 
+@kernel
+def rounding_run(noise: float, resolution: float) -> int:
+    """How many samples in a row are as the one before once in 1e9 times, by noise and rounding, at the worst rate.
+
+    Args:
+        noise: of a sample, 1 sigma.
+        resolution: step of the output, in the same unit.
+    """
+    steps = resolution / noise
+    # the chance that two normals fall into one step: the density of their difference at 0 times the step
+    chance = 0.5 * steps / math.sqrt(math.pi)
+    if steps > _COARSE:
+        # wherever the steps are narrow; of wide ones a rate in the middle of one is likeliest to stay there
+        beyond = normal_share(-min(0.5 * steps, _FARTHEST))[0]
+        chance = (1.0 - 2.0 * beyond) ** 2 + 2.0 * beyond * beyond
+    if chance <= 0.0:
+        return 0
+    if chance >= 1.0 + _LOG_FALSE_ALARM / _FOR_EVER:
+        return _FOR_EVER
+    return math.ceil(_LOG_FALSE_ALARM / math.log(chance))
+
+
 def equal_count(noise: float, resolution: float) -> int:
     """How many samples in a row must be as the one before until noise and rounding no longer explain it."""
-    # the chance that two normals fall into one step: the density of their difference at 0 times the step
-    chance = min(resolution / (2.0 * math.sqrt(math.pi) * noise), 0.999)
-    if chance <= 0.0:
-        return _FEWEST_EQUAL
-    count = math.ceil(math.log(_FALSE_ALARM) / math.log(chance))
-    return min(max(count, _FEWEST_EQUAL), _MOST_EQUAL)
+    return max(rounding_run.py_func(noise, resolution), _FEWEST_EQUAL)
 
 
 class RateChecks(NamedTuple):
@@ -151,12 +174,27 @@ def has_noise(axes) -> bool:
 
 
 @kernel
-def longest_run(p: RateChecks, axis) -> int:
-    """How many samples in a row must be as the one before until neither noise nor rounding explains it."""
+def step_seen(axes) -> float:
+    """Step of the output [rad/s] as far as axes (3,) have shown it, their smallest change; 0: none has changed."""
+    step = 0.0
+    for i in range(3):
+        least = axes[i].least_change
+        if least > 0.0 and (step == 0.0 or least < step):
+            step = least
+    return step
+
+
+@kernel
+def longest_run(p: RateChecks, axis, resolution: float) -> int:
+    """How many samples in a row must be as the one before until neither noise nor rounding explains it.
+
+    Args:
+        resolution: step of the output as it has shown itself.
+    """
     # the chance of the most usual number is no more than the root of that of a repetition, the sum of all squared
     chance = math.sqrt((axis.repeats + _PRIOR) / (axis.repeats + axis.changes + 2.0 * _PRIOR))
-    usual = math.ceil(_LOG_FALSE_ALARM / math.log(chance))
-    return min(max(p.equal, usual), _MOST_EQUAL)
+    usual = min(math.ceil(_LOG_FALSE_ALARM / math.log(chance)), _MOST_EQUAL)
+    return max(p.equal, usual, rounding_run(p.noise, resolution))
 
 
 @kernel
@@ -167,7 +205,7 @@ def forget_samples(axis) -> None:
 
 
 @kernel
-def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
+def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float, resolution: float) -> int:
     """Judges one sample; `axis.good` is the rate to go on with [rad/s].
 
     Args:
@@ -175,6 +213,7 @@ def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
         dt: [s] since the last sample.
         x: the sample [rad/s].
         speed: rate of the body [rad/s], all axes.
+        resolution: step of the output [rad/s] as the sensor has shown it; 0: not yet.
 
     Returns:
         SAMPLE_*; a jump is in `axis.jump`.
@@ -195,13 +234,14 @@ def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float) -> int:
     if change == 0.0:
         axis.equal += 1
     else:
-        axis.repeats += min(axis.equal, longest_run(p, axis))
+        axis.repeats += min(axis.equal, longest_run(p, axis, resolution))
         axis.equal = 0
         axis.changes += 1
+        axis.least_change = abs(change) if axis.least_change == 0.0 else min(axis.least_change, abs(change))
         axis.came_by_jump = 1 if abs(change) > step else 0
         axis.zeros += 1 if x == 0.0 else 0
     axis.raw = x
-    if axis.equal >= p.equal and axis.equal >= longest_run(p, axis):
+    if axis.equal >= p.equal and axis.equal >= longest_run(p, axis, resolution):
         return SAMPLE_STUCK
     off = abs(x - axis.good) > p.gate + by_torque * axis.gap
     axis.refused += _SHARE * ((1.0 if off else 0.0) - axis.refused)

@@ -53,7 +53,12 @@ def _parser() -> CommandParser:
         help="Sun estimators, or attitude filters of the graph, each in flights of its own (default: the one that "
         "controls, or all if none does)",
     )
-    add("--gyro", nargs="+", choices=("on", "off"), default=["on"], help="fly with the gyro, without, or both")
+    add(
+        "--gyro",
+        nargs="+",
+        choices=("on", "off"),
+        help="fly with the gyro, without, or both (default: as the mission has it)",
+    )
     add("--duration", type=float, metavar="S", help="simulated time of a flight [s] (default: the mission's)")
     add("--seed", type=int, metavar="N", help="key of all random streams (default: the mission's)")
     add("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="change one parameter")

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from css_analysis.configured_mission import flies_with_gyro
 from css_analysis.errors import StudyError
 from css_analysis.study_criteria import judge, refuse_unknown_criteria
 from css_common import places
@@ -17,6 +18,7 @@ from css_common.command import FAILED, INTERRUPTED
 from css_common.dispersions import SECTION
 from css_common.mission import Mission, load_mission
 from css_common.sampling import design_size
+from css_common.sensor_inputs import measures_rates
 from css_monte_carlo.mission_parts import measured_estimators
 from css_monte_carlo.progress import CaseProgress, progress_bar
 from css_monte_carlo.schedulers import DaskScheduler
@@ -167,11 +169,20 @@ def _configurations(mission: Mission, options: argparse.Namespace) -> list[Confi
     measured = measured_estimators(mission)
     estimators = options.estimators or measured
     return [
-        Configuration(estimator, gyro == "on", point)
+        Configuration(estimator, gyro, point)
         for point in itertools.product(*axes)
         for estimator in dict.fromkeys(estimators)
-        for gyro in dict.fromkeys(options.gyro)
+        for gyro in _gyros(mission, estimator, options.gyro)
     ]
+
+
+def _gyros(mission: Mission, estimator: str, asked: list[str] | None) -> list[bool]:
+    """Whether an estimator flies with its gyro, without, or both."""
+    if asked is None:
+        return [flies_with_gyro(mission, estimator)]
+    if "on" in asked and not measures_rates(mission.nodes):
+        raise StudyError(f"--gyro on: {mission.origin} has no gyro in graph.nodes; expected off")
+    return [gyro == "on" for gyro in dict.fromkeys(asked)]
 
 
 def _default_folder(mission: str) -> Path:
