@@ -213,8 +213,13 @@ def test_clouds_that_are_none_make_the_turn_be_looked_for_again_and_the_calibrat
     clouds = memory.estimates[best, X_GAIN + CELLS : X_GAIN + 2 * CELLS]
     assert not earth_is_elsewhere(flight.p, memory.estimates[best])
     memory.weights[:] = np.where(np.arange(len(memory.weights)) == best, 0.0, DEAD)
+    clouds[:] = np.where(np.arange(CELLS) == 3, 4.1, 0.0)
+    assert earth_is_elsewhere(flight.p, memory.estimates[best]), "one cell is enough"
+    clouds[:] = [2.5, -2.5] * (CELLS // 2)
+    assert not earth_is_elsewhere(flight.p, memory.estimates[best])
+    clouds[:] = [3.0, -3.0] * (CELLS // 2)
+    assert earth_is_elsewhere(flight.p, memory.estimates[best]), "and all together with less of each"
     clouds[:] = [5.0, -5.0] * (CELLS // 2)
-    assert earth_is_elsewhere(flight.p, memory.estimates[best])
     learnt, _ = calibration_states(flight.p, memory)
     heading = flight.step(gyro=True)
     assert heading.mode == filter_state.MODE_EARTH

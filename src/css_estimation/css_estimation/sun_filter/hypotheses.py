@@ -39,6 +39,8 @@ _GIVEN_UP = -12.0
 _ALIKE_COS = 1.0 + 2.0 * math.cos(0.05)
 # Mean square of the states of the clouds, 1 for clouds, beyond which they are none.
 _NO_CLOUDS = 8.0
+# The square of one alone: where the Sun is on a cell that the estimate has beyond its edge, clouds stand for sunlight.
+_NO_CLOUD = 4.0**2
 # Errors of a new hypothesis [rad2]: about the Sun line, and across it what the unknown Earth may have done.
 _ROLL_VARIANCE = 0.2**2
 _HEADING_VARIANCE = 0.05**2
@@ -130,10 +132,11 @@ def earth_is_elsewhere(p: SunFilterParameters, x) -> bool:
     line.
     """
     cells = p.cells.shape[0]
-    squares = 0.0
+    squares, largest = 0.0, 0.0
     for i in range(X_GAIN + cells, X_GAIN + 2 * cells):
         squares += x[i] * x[i]
-    return squares > _NO_CLOUDS * cells
+        largest = max(largest, x[i] * x[i])
+    return squares > _NO_CLOUDS * cells or largest > _NO_CLOUD
 
 
 @kernel
