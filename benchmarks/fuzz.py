@@ -224,10 +224,7 @@ def fuzz_requests(trial: Trial, count: int, draw: random.Random, nodes: list[Com
 
 
 def _asked(call: Callable[[Any, Any], Any], request: Any, response: Any) -> str:
-    return _answer(call(request, response))
-
-
-def _answer(response: Any) -> str:
+    response = call(request, response)
     return "taken" if response.success and not response.message else _one_line(response.message)
 
 

@@ -6,6 +6,7 @@ import json
 import os
 import shutil
 import signal
+from functools import partial
 from typing import Any
 
 import pytest
@@ -161,33 +162,32 @@ def test_a_program_with_the_most_significant_byte_first_does_not_fly(mission, fi
         stand_ins(mission, [f"ekf={foreign}"])
 
 
+def stepped_29_times(mission, library):
+    """A step of a library in the place of `ekf`, after those that it does."""
+    (node,) = (node for node in mission.nodes if node.name == "ekf")
+    stand_in = stand_ins(mission, [f"ekf={library}"])["ekf"]
+    stepper = Stepper(stand_in, node.name, node.canonical, mission.events, mission.epoch_ns)
+    step: Any = partial(vars(stepper.component)["_step"], *functions_of_ekf(mission).sample)
+    for _ in range(29):
+        step()
+    return step
+
+
 def test_a_library_that_ends_in_a_step_ends_alone(mission, files):
     """Its process ends, not that of the graph, and why is said in a line, again and again."""
-    (node,) = (node for node in mission.nodes if node.name == "ekf")
-    stand_in = stand_ins(mission, [f"ekf={files['crashing']}"])["ekf"]
-    stepper = Stepper(stand_in, node.name, node.canonical, mission.events, mission.epoch_ns)
-    step: Any = vars(stepper.component)["_step"]
-    arguments = functions_of_ekf(mission).sample
-    for _ in range(29):
-        step(*arguments)
+    step = stepped_29_times(mission, files["crashing"])
     for _ in range(2):
         with pytest.raises(ComponentError, match=r"crashing\.so: ended by SIGABRT$"):
-            step(*arguments)
+            step()
 
 
 def test_a_library_that_does_not_come_back_from_a_step_is_ended(mission, files, monkeypatch):
     """Nothing else would end it: it hears no interrupt, and the flight that waits for it hears none either."""
     monkeypatch.setattr(stand_in_of_export, "_PATIENCE_S", 2.0)
-    (node,) = (node for node in mission.nodes if node.name == "ekf")
-    stand_in = stand_ins(mission, [f"ekf={files['hanging']}"])["ekf"]
-    stepper = Stepper(stand_in, node.name, node.canonical, mission.events, mission.epoch_ns)
-    step: Any = vars(stepper.component)["_step"]
-    arguments = functions_of_ekf(mission).sample
-    for _ in range(29):
-        step(*arguments)
+    step = stepped_29_times(mission, files["hanging"])
     for _ in range(2):
         with pytest.raises(ComponentError, match=r"hanging\.so: no answer within 2 s: ended$"):
-            step(*arguments)
+            step()
 
 
 def test_a_library_that_ends_in_flight_holds_nobody_up(mission, files):

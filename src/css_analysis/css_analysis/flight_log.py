@@ -187,10 +187,14 @@ class FlightLog:
         nodes = self.mission.nodes if self.mission is not None else ()
         for node in nodes:
             if node.name == name and hasattr(node.values, "use_gyro"):
-                return bool(node.values.use_gyro and (measures_rates(nodes) or self.went_by_gyro(name)))
-        return self.went_by_gyro(name)
+                return bool(node.values.use_gyro and self.had_gyro(name))
+        return self._went_by_gyro(name)
 
-    def went_by_gyro(self, name: str) -> bool:
+    def had_gyro(self, name: str) -> bool:
+        """Whether an estimator had a gyro: one is in the mission, or it took rates from one."""
+        return (self.mission is not None and measures_rates(self.mission.nodes)) or self._went_by_gyro(name)
+
+    def _went_by_gyro(self, name: str) -> bool:
         """Whether an estimator ever took its rates from a gyro."""
         if name in self.attitudes:
             return bool(np.any(self.attitudes[name].used & AttitudeEstimate.USED_GYRO))

@@ -17,7 +17,6 @@ from css_bringup.replay_verdict import shortcomings, software_apart
 from css_bringup.replayed import Replayed
 from css_bringup.report import result_object
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text
-from css_common.sensor_inputs import measures_rates
 from css_environment.orbit_checks import recorded_orbit_findings
 from css_estimation.health.coarse_steps import coarse_lines
 from css_recording.bag_folder import free_name
@@ -211,10 +210,9 @@ def _paired(replayed: Iterable[Replayed], log: FlightLog) -> Iterable[tuple[Repl
 def _named(run: Replayed, figures: Run, log: FlightLog) -> Run:
     # the log knows an estimator by its topic; what it stands for is known here
     use_gyro = getattr(run.node.values, "use_gyro", None)
-    there = log.went_by_gyro(run.label) or (log.mission is not None and measures_rates(log.mission.nodes))
     return figures | {
         "estimator": ":".join(filter(None, (run.node.name, run.changed))),
-        "gyro": "on" if use_gyro is None or (use_gyro and there) else "off",
+        "gyro": "on" if use_gyro is None or (use_gyro and log.had_gyro(run.label)) else "off",
         "flown": run.comparison is not None,
         "topic": next(iter(run.topics.values())),
         "identical": run.comparison.identical if run.comparison is not None else None,
