@@ -234,8 +234,9 @@ def check_sample(p: RateChecks, axis, dt: float, x: float, speed: float, resolut
     if change == 0.0:
         axis.equal += 1
     else:
-        axis.repeats += min(axis.equal, longest_run(p, axis, resolution))
-        axis.equal = 0
+        if axis.equal > 0:
+            axis.repeats += min(axis.equal, longest_run(p, axis, resolution))
+            axis.equal = 0
         axis.changes += 1
         axis.least_change = abs(change) if axis.least_change == 0.0 else min(axis.least_change, abs(change))
         axis.came_by_jump = 1 if abs(change) > step else 0
