@@ -5,7 +5,6 @@ import os
 import random
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -24,6 +23,7 @@ from css_common.executor import retire
 from css_common.mission import Mission, load_mission
 from css_common.mission_file import dump_sections
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
+from css_common.testing import installed
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
 from css_recording.recovery import recover
@@ -211,7 +211,7 @@ def freeze_recorder(reference: Reference, place: Path, seed: int) -> Iterator[Ou
 
 
 def _start_fly(mission: Path, place: Path, *options: str) -> subprocess.Popen:
-    command = [sys.executable, "-m", "css_bringup.commands.fly", str(mission), "--out", str(place / "bag"), *options]
+    command = [str(installed("css_bringup", "fly")), str(mission), "--out", str(place / "bag"), *options]
     with (place / "fly.log").open("wb") as log:
         return subprocess.Popen(command, stdout=log, stderr=log, stdin=subprocess.DEVNULL, start_new_session=True)
 

@@ -7,9 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from ament_index_python.packages import get_package_prefix
 
 from bootstrap.verbs import VERBS
+from css_common.testing import installed
 
 ROOT = Path(__file__).parents[1]
 NODES = sorted(
@@ -19,20 +19,19 @@ NODES = sorted(
 SLOW = {"numba", "scipy", "rclpy", "matplotlib", "pyarrow", "rosbags", "mcap"}
 
 
-def _executable(package: str, executable: str) -> Path:
-    path = Path(get_package_prefix(package)) / "lib" / package / executable
-    assert os.access(path, os.X_OK), f"{package} {executable} is not installed"
-    return path
-
-
 def _help(package: str, executable: str, verb: str = "") -> str:
-    command = [str(_executable(package, executable)), "--help"]
+    command = [str(installed(package, executable)), "--help"]
     typed = {"SUNPOINT_VERB": f"{verb}:{executable}"} if verb else {}
     done = subprocess.run(
         command, capture_output=True, text=True, timeout=100, check=False, env={**os.environ, **typed}
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+@pytest.mark.parametrize("file", sorted(ROOT.glob("src/*/*/nodes/*.py")) + sorted(ROOT.glob("src/*/*/commands/*.py")))
+def test_an_executable_has_no_second_door(file):
+    assert "__main__" not in file.read_text(), "what is installed guards its start and its end, `python -m` does not"
 
 
 @pytest.mark.parametrize("verb", sorted(name for name, verb in VERBS.items() if verb.package))
@@ -52,7 +51,7 @@ def test_verb_explains_itself_under_the_name_that_was_typed(verb):
 def test_verb_loads_nothing_that_takes_long_before_its_options_are_read(verb):
     entry = VERBS[verb]
     done = subprocess.run(
-        [_executable(entry.package, entry.executable), "--help"],
+        [installed(entry.package, entry.executable), "--help"],
         capture_output=True, text=True, timeout=100, check=True, env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"},
     )  # fmt: skip
     loaded = {line.rpartition("|")[2].strip().partition(".")[0] for line in done.stderr.splitlines()}
@@ -85,7 +84,7 @@ SOME = [
 @pytest.mark.parametrize(("package", "executable"), SOME)
 def test_help_that_nobody_reads_is_no_error(package, executable):
     process = subprocess.Popen(
-        [_executable(package, executable), "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [installed(package, executable), "--help"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     assert process.stdout is not None
     process.stdout.close()
@@ -98,7 +97,7 @@ def test_help_that_nobody_reads_is_no_error(package, executable):
 def test_an_interrupt_while_libraries_load_says_nothing(package, executable, library):
     arguments = ["--ros-args"] if executable == "ekf" else ["--help"]
     process = subprocess.Popen(
-        [_executable(package, executable), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+        [installed(package, executable), *arguments], stdout=subprocess.PIPE, stderr=subprocess.PIPE
     )
     loaded = Path(f"/proc/{process.pid}/maps")
     while process.poll() is None and library not in loaded.read_text():

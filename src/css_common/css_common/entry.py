@@ -3,14 +3,19 @@
 
 Nothing is imported here but the standard library and modules that need no more, because what comes before the first
 line of a module cannot be guarded.
+
+A process that had ROS does not take the interpreter apart: threads of the middleware are in it until the end, may crash
+what has done its work, and on a loaded machine cost seconds.
 """
 
+import atexit
 import importlib
 import importlib.util
 import os
 import sys
 from pathlib import Path
 from types import ModuleType
+from typing import NoReturn
 
 from css_common import network, security, supervised
 from css_common.command import plain_interrupts
@@ -22,6 +27,7 @@ _INTERRUPTED = 130
 
 def main() -> int:
     """Runs `main` of PACKAGE/nodes/NAME.py or PACKAGE/commands/NAME.py, started as lib/PACKAGE/NAME; its exit code."""
+    ending = _Ending()
     with plain_interrupts():
         supervised.take_on()
         tell_of_compiling()
@@ -33,11 +39,31 @@ def main() -> int:
     except KeyboardInterrupt:
         code = _INTERRUPTED
     if ".nodes." in module.__name__:
-        # A node has given up what it held. Taking the interpreter apart would cost seconds on a loaded machine, with
-        # threads of the middleware still running in it, which may crash it.
-        sys.stderr.flush()
-        os._exit(code)
+        _leave(code)  # a node has given up what it held, at its exit is nothing to be done
+    ending.code = code
     return code
+
+
+class _Ending:
+    """Leaves after everything else that is to be done at exit: what was registered first comes last.
+
+    Attributes:
+        code: exit code of the command; None before it has ended by itself.
+    """
+
+    def __init__(self) -> None:
+        self.code: int | None = None
+        atexit.register(self._last)
+
+    def _last(self) -> None:
+        if self.code is not None and "rclpy" in sys.modules:
+            _leave(self.code)
+
+
+def _leave(code: int) -> NoReturn:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _module(executable: Path) -> ModuleType:

@@ -8,7 +8,8 @@ empties each ready queue before it builds its wait set anew, which is what costs
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from rclpy.clock import Clock, ClockType
 from rclpy.context import Context
@@ -85,6 +86,21 @@ def retire(executor: Executor, node: Node) -> None:
         stop_listening()
     executor.remove_node(node)
     node.destroy_node()
+
+
+@contextmanager
+def executor_with(node: Node) -> Iterator[Executor]:
+    """An executor that runs one node; at the end both are given up.
+
+    An executor that is left behind is one into which threads of the middleware call while Python takes itself apart.
+    """
+    executor = create_executor(None, node.context)
+    executor.add_node(node)
+    try:
+        yield executor
+    finally:
+        retire(executor, node)
+        executor.shutdown()
 
 
 def spin_until(

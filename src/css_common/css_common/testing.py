@@ -6,8 +6,10 @@ Every wait is for a condition, with a deadline that only a failure reaches.
 
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
+from ament_index_python.packages import get_package_prefix
 from rcl_interfaces.msg import Log
 from rclpy.context import Context
 from rclpy.node import Node
@@ -24,6 +26,11 @@ from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
 
 DEADLINE = 200.0
 """Wall time [s] after which a condition is taken for one that never comes; a loaded machine takes its time."""
+
+
+def installed(package: str, executable: str) -> Path:
+    """File that `ros2 run` starts, which does not exist where the package has no such node or command."""
+    return Path(get_package_prefix(package)) / "lib" / package / executable
 
 
 class Bench:

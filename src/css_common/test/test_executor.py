@@ -2,11 +2,14 @@
 """Both executors: messages, timers and services all get their turn, and errors come out."""
 
 import pytest
+from rclpy.context import Context
 from rclpy.executors import ExternalShutdownException
+from rclpy.node import Node
 from std_msgs.msg import Float64, Int64
 from std_srvs.srv import Trigger
 
-from css_common.executor import DrainingExecutor, create_executor, spin_about_until, spin_until
+from css_common.executor import DrainingExecutor, create_executor, executor_with, spin_about_until, spin_until
+from css_common.ros_internals import InvalidHandle
 
 
 def test_kinds(bench, monkeypatch):
@@ -79,6 +82,24 @@ def test_the_condition_is_asked_while_messages_never_end(bench):
     bench.node.create_timer(0.01, bench.context.shutdown)
     with pytest.raises(ExternalShutdownException):
         spin_about_until(bench.executor, lambda: False, node, interval=0.002)
+
+
+def test_an_executor_with_one_node_is_given_up_with_it():
+    context = Context()
+    context.init()
+    node = Node("short_lived", context=context, use_global_arguments=False)
+    heard: list = []
+    node.create_subscription(Float64, "echo", heard.append, 10)
+    publisher = node.create_publisher(Float64, "echo", 10)
+    with executor_with(node) as executor:
+        spin_until(executor, lambda: publisher.get_subscription_count() == 1, context=context)
+        publisher.publish(Float64(data=1.0))
+        spin_until(executor, lambda: bool(heard), context=context)
+    with pytest.raises(InvalidHandle), node.handle:
+        pass
+    with pytest.raises(InvalidHandle), publisher.handle:
+        pass
+    context.try_shutdown()
 
 
 def test_messages_of_many_topics_arrive_in_the_order_of_each(bench):

@@ -18,7 +18,7 @@ from std_srvs.srv import Trigger
 
 from css_common import pace_controls
 from css_common.qos import LOOP_PUBLISHER, RECORDER_SUBSCRIPTION
-from css_common.testing import DEADLINE
+from css_common.testing import DEADLINE, installed
 from css_msgs.msg import CssVoltages, WheelTorqueCommand
 from css_recording.bag_reader import BagReader
 from css_recording.bag_writer import BagWriter
@@ -262,10 +262,11 @@ def test_keys_on_a_terminal_hold_and_let_go(flight, tmp_path, graph, heard):
     before = termios.tcgetattr(terminal)
     arguments = [str(folder), "--topic", "css/voltages", "--rate", "100", "--start-paused", "--json"]
     # the terminal is its own, as it is that of a program that a shell has started
-    program = "import fcntl, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
-    program += "from css_recording.nodes.player import main; sys.exit(main(sys.argv[1:]))"
+    program = (
+        "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execv(sys.argv[1], sys.argv[1:])"
+    )
     process = subprocess.Popen(
-        [sys.executable, "-c", program, *arguments],
+        [sys.executable, "-c", program, installed("css_recording", "player"), *arguments],
         stdin=terminal, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
     )  # fmt: skip
     try:
@@ -289,7 +290,7 @@ def test_keys_on_a_terminal_hold_and_let_go(flight, tmp_path, graph, heard):
 
 def test_an_interrupt_ends_a_held_playback_cleanly(flight, tmp_path, graph, heard):
     folder = flight.record(tmp_path / "bag", 11)
-    arguments = [sys.executable, "-m", "css_recording.nodes.player", str(folder), "--start-paused"]
+    arguments = [str(installed("css_recording", "player")), str(folder), "--start-paused"]
     process = subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         node = graph.nodes[0]

@@ -3,7 +3,6 @@
 
 import signal
 import subprocess
-import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +13,7 @@ from sensor_msgs.msg import Imu
 
 from css_common.codec import codec_of, stamp_of
 from css_common.qos import LOOP_PUBLISHER, LOOP_SUBSCRIPTION, RECORDER_SUBSCRIPTION
-from css_common.testing import DEADLINE
+from css_common.testing import DEADLINE, installed
 from css_msgs.msg import CssVoltages, SunEstimate
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
@@ -170,9 +169,7 @@ def test_player_process_loops_until_told_to_end(flight, tmp_path, graph):
     folder = flight.record(tmp_path / "bag", 10)
     voltages = Listener(graph.node("listener"), CssVoltages, "css/voltages")
     arguments = [str(folder), "--rate", "20", "--loop"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "css_recording.nodes.player", *arguments], stdout=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen([installed("css_recording", "player"), *arguments], stdout=subprocess.PIPE, text=True)
     try:
         graph.spin_until(lambda: len(voltages.heard) > 25)
         process.send_signal(signal.SIGINT)

@@ -4,7 +4,6 @@
 import json
 import signal
 import subprocess
-import sys
 from types import SimpleNamespace
 
 import pytest
@@ -15,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from css_common.qos import LOOP_PUBLISHER
-from css_common.testing import DEADLINE
+from css_common.testing import DEADLINE, installed
 from css_msgs.msg import CssVoltages
 from css_recording.bag_reader import BagReader
 from css_recording.errors import BagError
@@ -177,7 +176,7 @@ def test_a_failing_disk_ends_the_recording_and_not_the_process(flight, tmp_path,
 def test_recorder_process_finishes_its_recording_when_told_to_end(flight, tmp_path, graph, number, doctor):
     folder, figures = tmp_path / "bag", tmp_path / "figures.json"
     arguments = ["--topic", "css/voltages", "-o", str(folder), "--summary", str(figures)]
-    process = subprocess.Popen([sys.executable, "-m", "css_recording.nodes.recorder", *arguments])
+    process = subprocess.Popen([installed("css_recording", "recorder"), *arguments])
     try:
         publisher = graph.node("driver").create_publisher(CssVoltages, "css/voltages", LOOP_PUBLISHER)
         graph.spin_until(lambda: publisher.get_subscription_count() == 1)
@@ -266,7 +265,7 @@ def test_command_splits_and_says_what_never_came(flight, tmp_path, graph):
     folder = tmp_path / "bag"
     arguments = ["--topic", "css/voltages", "--topic", "nobody", "-o", str(folder), "--max-bag-duration", "3", "--json"]
     process = subprocess.Popen(
-        [sys.executable, "-m", "css_recording.nodes.recorder", *arguments],
+        [installed("css_recording", "recorder"), *arguments],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     try:

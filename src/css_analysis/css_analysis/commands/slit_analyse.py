@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sun angle, rotation rate and coning from a file of slit pulses (columns slit and count, and head for several)."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -46,7 +45,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     run = implementation("css_analysis.verbs.slit_analyse")
     return guarded(parser.prog, lambda: run(parser.prog, options), (SlitFileError, ParameterError, OSError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

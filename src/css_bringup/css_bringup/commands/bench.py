@@ -9,7 +9,6 @@ minutes on two processors.
 """
 
 import argparse
-import sys
 
 from css_bringup.json_process import MeasurementError
 from css_bringup.options import add_domain_option, guarded, whole_number
@@ -57,7 +56,3 @@ def main(args: list[str] | None = None) -> int:
     arguments = parser.parse_args(args)
     run = implementation("css_bringup.verbs.bench")
     return guarded(parser.prog, lambda: run(arguments), (MeasurementError,))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ with help of a gyro, four reaction wheels turn the solar arrays to it, the recor
 average and Kalman filter, each with gyro and without.
 """
 
-import sys
 from pathlib import Path
 
 from css_bringup.options import add_domain_option, add_mission_options, add_output_options, guarded
@@ -33,7 +32,3 @@ def main(args: list[str] | None = None) -> int:
     arguments = parser.parse_args(args)
     run = implementation("css_bringup.verbs.demo")
     return guarded(parser.prog, lambda: run(arguments))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

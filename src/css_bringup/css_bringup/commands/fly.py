@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Flies a mission on the real graph and records it."""
 
-import sys
-
 from css_bringup.options import add_domain_option, add_mission_options, add_output_options, add_security_option, guarded
 from css_common.command import CommandParser, command_parser, implementation
 from css_report.page_option import add_page_option
@@ -56,7 +54,3 @@ def main(args: list[str] | None = None) -> int:
         parser.error("--paused: expected --stay with it")
     run = implementation("css_bringup.verbs.fly")
     return guarded(parser.prog, lambda: run(arguments))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

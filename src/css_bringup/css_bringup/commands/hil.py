@@ -5,8 +5,6 @@ The simulation sends what the sensors say to the board, each control cycle, and 
 command for wheels and rods back. docs/hil.md has the format of the frames and a client in C.
 """
 
-import sys
-
 from css_bringup.options import add_domain_option, add_mission_options, add_output_options, guarded
 from css_common.command import CommandParser, command_parser, implementation, positive
 
@@ -61,7 +59,3 @@ def main(args: list[str] | None = None) -> int:
     arguments = parser.parse_args(args)
     run = implementation("css_bringup.verbs.hil")
     return guarded(parser.prog, lambda: run(arguments))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,7 +9,6 @@ What the mission scripted and what was set in flight happens to the estimators t
 A value that is asked for here (NAME:KEY=VALUE, --set) stays.
 """
 
-import sys
 from pathlib import Path
 
 from css_bringup.options import guarded
@@ -58,7 +57,3 @@ def main(args: list[str] | None = None) -> int:
     arguments = parser.parse_args(args)
     run = implementation("css_bringup.verbs.replay")
     return guarded(parser.prog, lambda: run(arguments))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

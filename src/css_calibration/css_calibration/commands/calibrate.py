@@ -6,7 +6,6 @@ coefficient; of the magnetometer bias, scale and soft iron; of the gyro its bias
 what the recording cannot tell named and left as it is. The outputs at the end are held out and show what it is worth.
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -52,7 +51,3 @@ def _parser() -> CommandParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     return run_command(_parser(), arguments, "css_calibration.verbs.calibrate", "interrupted; no calibration written")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,6 @@ Dead, stuck, saturated, noisy, shadowed from some directions, swapped with anoth
 the other kinds that flight software names, each with its evidence and the stretch of time.
 """
 
-import sys
 from collections.abc import Sequence
 
 from css_calibration.recording_command import add_recording, run_command
@@ -37,7 +36,3 @@ def _parser() -> CommandParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     return run_command(_parser(), arguments, "css_calibration.verbs.check")
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ drives the graph that runs already.
 """
 
 import argparse
-import sys
 
 from css_bringup.options import add_domain_option, guarded
 from css_common.command import CommandParser, command_parser, implementation
@@ -72,7 +71,3 @@ def main(args: list[str] | None = None) -> int:
         parser.error("--attach: starts no flight; expected no --case, --seed, --duration, --set, --rate or --record")
     run = implementation("css_console.verbs.console")
     return guarded(parser.prog, lambda: run(options), (ConsoleError,))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

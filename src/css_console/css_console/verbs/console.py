@@ -19,7 +19,7 @@ from css_bringup.options import console, errors
 from css_bringup.staying import Staying, fly_and_stay
 from css_bringup.verbs.fly import conclude
 from css_common.command import FAILED, INTERRUPTED
-from css_common.executor import create_executor
+from css_common.executor import executor_with
 from css_common.mission import Mission, load_mission, mission_from_text
 from css_common.mission_lookup import known_missions
 from css_common.output_port import OutputPort
@@ -103,13 +103,8 @@ def _play(options: argparse.Namespace, libraries: Mapping[str, Path]) -> int:
         served = _Served(options, libraries, "recording", told, fallback, begin_ns)
         with StopSignal() as stop, ros_process("player", ()), served:
             node = PlayerNode(recording, PlaybackOptions(rate=rate, paused=True, stay=True))
-            executor = create_executor()
-            executor.add_node(node)
-            try:
+            with executor_with(node) as executor:
                 node.play(executor, lambda: stop.came)
-            finally:
-                executor.remove_node(node)
-                node.destroy_node()
         for note in recording.notes:
             errors.print(f"note: {note}", soft_wrap=True)
     return served.code(INTERRUPTED if stop.came else 0)

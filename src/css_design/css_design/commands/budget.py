@@ -7,7 +7,6 @@ recording: what each source of the mission in it made in that flight.
 """
 
 import signal
-import sys
 from collections.abc import Sequence
 
 from css_analysis.errors import StudyError
@@ -42,7 +41,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run = implementation("css_design.verbs.budget")
     wrong = (DesignError, MissionError, StudyError, BagError, OSError)
     return guarded(parser.prog, lambda: run(options), wrong)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,7 +7,6 @@ Every number of cells is written as a mission that flies.
 """
 
 import signal
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -101,7 +100,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     run = implementation("css_design.verbs.layout")
     return guarded(parser.prog, lambda: run(options), (DesignError, MissionError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -6,7 +6,6 @@ file. Gains follow from inertia, wheels and control cycle, integration steps fro
 """
 
 import signal
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -51,7 +50,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return guarded(
         parser.prog, lambda: run(options), (DesignError, OSError), interrupted="interrupted; nothing written"
     )
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,6 @@ It is made from the parsers of the verbs, and knows those that there were when i
 update.
 """
 
-import sys
 from collections.abc import Sequence
 
 from css_common.command import CommandParser, command_parser, guarded, implementation
@@ -34,7 +33,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     run = implementation("css_docs.verbs.completion")
     return guarded(parser.prog, lambda: run(options), (DocsError,))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -5,7 +5,6 @@ Reference, algorithm sections and figures are made from the code; a link that le
 set or any other warning fails the build. Figures are drawn anew when the code that they are drawn by changes.
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -40,7 +39,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     run = implementation("css_docs.verbs.docs")
     return guarded(parser.prog, lambda: run(options), (DocsError, MissionError, OSError), (BrokenPages,))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

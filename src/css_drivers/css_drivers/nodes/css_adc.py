@@ -160,6 +160,3 @@ class CssAdc(Device):
 
 
 main = node_main(CssAdc)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

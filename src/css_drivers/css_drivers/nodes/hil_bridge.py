@@ -252,6 +252,3 @@ def _estimate(answer: Command | None) -> dict[str, Any]:
 
 
 main = node_main(HilBridge)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -32,6 +32,3 @@ class ImuRelay(Relay):
 
 
 main = node_main(ImuRelay)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -25,6 +25,3 @@ class MagnetometerRelay(Relay):
 
 
 main = node_main(MagnetometerRelay)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -45,6 +45,3 @@ class AttitudeFilter(AttitudeEstimator):
 
 
 main = node_main(AttitudeFilter)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

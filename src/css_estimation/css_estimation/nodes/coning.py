@@ -144,6 +144,3 @@ def _padded(values: Iterable[float]) -> np.ndarray:
 
 
 main = node_main(Coning)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

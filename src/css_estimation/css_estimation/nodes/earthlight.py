@@ -43,6 +43,3 @@ class Earthlight(AttitudeEstimator):
 
 
 main = node_main(Earthlight)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -17,6 +17,3 @@ class Ekf(SunEstimator):
 
 
 main = node_main(Ekf)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

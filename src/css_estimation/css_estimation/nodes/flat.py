@@ -19,6 +19,3 @@ class Flat(SunEstimator):
 
 
 main = node_main(Flat)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -20,6 +20,3 @@ class PyramidSwitch(SunEstimator):
 
 
 main = node_main(PyramidSwitch)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -119,6 +119,3 @@ class SlitPassages(Component):
 
 
 main = node_main(SlitPassages)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -42,6 +42,3 @@ class SunFilter(SunEstimator):
 
 
 main = node_main(SunFilter)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

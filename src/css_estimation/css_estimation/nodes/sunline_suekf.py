@@ -17,6 +17,3 @@ class SunlineSuekf(SunEstimator):
 
 
 main = node_main(SunlineSuekf)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

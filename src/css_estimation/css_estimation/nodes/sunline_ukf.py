@@ -17,6 +17,3 @@ class SunlineUkf(SunEstimator):
 
 
 main = node_main(SunlineUkf)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

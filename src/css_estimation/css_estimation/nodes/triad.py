@@ -241,6 +241,3 @@ class Triad(Component):
 
 
 main = node_main(Triad)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

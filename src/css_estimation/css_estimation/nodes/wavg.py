@@ -17,6 +17,3 @@ class Wavg(SunEstimator):
 
 
 main = node_main(Wavg)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

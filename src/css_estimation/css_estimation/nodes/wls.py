@@ -17,6 +17,3 @@ class Wls(SunEstimator):
 
 
 main = node_main(Wls)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

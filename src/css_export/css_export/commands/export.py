@@ -6,7 +6,6 @@ another processor. With --verify the inputs of a recorded flight go through each
 state are compared with those of the function that flew, bit by bit.
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -72,7 +71,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     run = implementation("css_export.verbs.export")
     wrong = (MissionError, ExportError, BagError)
     return guarded(parser.prog, lambda: run(options), wrong, (ToolError, OSError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps how well a mission's layout of coarse sun sensor cells sees the Sun, and how wrong the weighted average is."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -43,7 +42,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     run = implementation("css_monte_carlo.verbs.coverage")
     return guarded(parser.prog, lambda: run(options), (MissionError, OSError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

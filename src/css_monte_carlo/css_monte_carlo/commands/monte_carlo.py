@@ -7,7 +7,6 @@ again, and ends with the same bytes. `fly MISSION --case K` flies one of the cas
 """
 
 import signal
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -131,7 +130,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupted = "interrupted; the same command with the same --out goes on from here"
     run = implementation("css_monte_carlo.verbs.monte_carlo")
     return guarded(parser.prog, lambda: run(options), (MissionError, StudyError), interrupted=interrupted)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -2,7 +2,6 @@
 """Flies a paper's experiments again: its figures, and its numbers beside ours, as a page."""
 
 import signal
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -41,7 +40,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     interrupted = "interrupted; the same command goes on from here"
     run = implementation("css_papers.verbs.reproduce")
     return guarded(parser.prog, lambda: run(options), wrong, interrupted=interrupted)
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Finishes the recording of a recorder that was killed. `recover --help` tells how it is used."""
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -36,7 +35,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return USAGE
     run = implementation("css_recording.verbs.recover")
     return guarded(parser.prog, lambda: run(options.recording, options.output), (), (BagError,))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

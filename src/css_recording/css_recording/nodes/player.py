@@ -79,7 +79,3 @@ def _parser() -> CommandParser:
     )  # fmt: skip
     add("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())

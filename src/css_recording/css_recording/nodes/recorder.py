@@ -76,7 +76,3 @@ def _parser() -> CommandParser:
     add("--summary", metavar="FILE", help="leave the figures of the recording in a JSON file")
     add("--json", action="store_true", help="print the result as one JSON object on the last line")
     return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 
 from css_common.command import CommandParser, complain, guarded
-from css_common.executor import create_executor
+from css_common.executor import executor_with
 from css_common.stop_signal import StopSignal
 from css_recording.errors import BagError
 from css_recording.merged_bags import MergedBags
@@ -65,14 +65,8 @@ def _name_unused_overrides(parser: CommandParser, playback: PlaybackOptions, rec
 
 def _play(recording: MergedBags, playback: PlaybackOptions, stop: StopSignal) -> PlaybackReport:
     node = PlayerNode(recording, playback)
-    executor = create_executor()
-    executor.add_node(node)
-    try:
-        with TerminalKeys() as keys:
-            return node.play(executor, lambda: stop.came, lambda: _obey(node, keys))
-    finally:
-        executor.remove_node(node)
-        node.destroy_node()
+    with executor_with(node) as executor, TerminalKeys() as keys:
+        return node.play(executor, lambda: stop.came, lambda: _obey(node, keys))
 
 
 def _obey(node: PlayerNode, keys: TerminalKeys) -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from rclpy.executors import Executor
 
 from css_common.command import FAILED, CommandParser, complain, guarded
-from css_common.executor import create_executor, retire, spin_until
+from css_common.executor import executor_with, spin_until
 from css_common.mission import load_mission
 from css_common.mission_file import MissionError
 from css_common.stop_signal import StopSignal
@@ -68,16 +68,14 @@ def _record(
     parser: CommandParser, options: argparse.Namespace, node: RecorderNode, folder: Path, stop: StopSignal
 ) -> list[str]:
     """Records until told to end; topics that were named and never appeared."""
-    executor = create_executor()
-    executor.add_node(node)
-    try:
-        node.get_logger().info(f"recording into {folder}")
-        spin_until(executor, lambda: stop.came or bool(node.failure))
-        _drain(executor, node)
-    finally:
-        node.close(_incidents(options.notes))
-        missing = _say(parser, options, node, folder)
-        retire(executor, node)
+    with executor_with(node) as executor:
+        try:
+            node.get_logger().info(f"recording into {folder}")
+            spin_until(executor, lambda: stop.came or bool(node.failure))
+            _drain(executor, node)
+        finally:
+            node.close(_incidents(options.notes))
+            missing = _say(parser, options, node, folder)
     return missing
 
 

@@ -6,7 +6,6 @@ of each cell, the orbit with its light, what was refused and why, mission and ve
 with confidence intervals, and the worst cases with the command that flies each. Two of either stand side by side.
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -37,7 +36,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     run = implementation("css_report.verbs.report")
     return guarded(parser.prog, lambda: run(options), (ReportError, BagError, MissionError, StudyError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

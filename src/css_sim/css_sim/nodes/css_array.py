@@ -184,6 +184,3 @@ class CssArray(Component):
 
 
 main = node_main(CssArray)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

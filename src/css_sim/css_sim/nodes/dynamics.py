@@ -236,6 +236,3 @@ def _tachometers_fail(values: Values) -> bool:
 
 
 main = node_main(Dynamics)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

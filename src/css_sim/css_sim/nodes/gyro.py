@@ -104,6 +104,3 @@ class Gyro(Component):
 
 
 main = node_main(Gyro)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -110,6 +110,3 @@ class Magnetometer(Component):
 
 
 main = node_main(Magnetometer)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

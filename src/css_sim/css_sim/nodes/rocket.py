@@ -77,6 +77,3 @@ class Rocket(Plant):
 
 
 main = node_main(Rocket)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

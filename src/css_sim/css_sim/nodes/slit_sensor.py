@@ -158,6 +158,3 @@ class SlitSensor(Component):
 
 
 main = node_main(SlitSensor)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

@@ -3,7 +3,6 @@
 
 import math
 import signal
-import sys
 from collections.abc import Sequence
 
 from css_common.command import CommandParser, command_parser, guarded, implementation, number
@@ -78,7 +77,3 @@ def _parser() -> CommandParser:
     parser.add_argument("--overwrite", action="store_true", help="replace a recording or description that is there")
     parser.add_argument("--json", action="store_true", help="print the summary as one JSON object on the last line")
     return parser
-
-
-if __name__ == "__main__":
-    sys.exit(main())

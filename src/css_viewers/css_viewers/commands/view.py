@@ -6,7 +6,6 @@ file for the Rerun viewer instead. To see a flight while it flies, add css_viewe
 mission, or start it beside: ros2 run css_viewers visualizer --ros-args --params-file config/okeefe_2013.yaml
 """
 
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -43,7 +42,3 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("-o and --rerun: expected one of them")
     run = implementation("css_viewers.verbs.view")
     return guarded(parser.prog, lambda: run(options), (ViewerError, BagError, MissionError))
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -26,6 +26,3 @@ class Visualizer(SceneComponent):
 
 
 main = node_main(Visualizer)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

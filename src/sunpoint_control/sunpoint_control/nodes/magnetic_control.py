@@ -33,6 +33,3 @@ class MagneticControl(Controller):
 
 
 main = node_main(MagneticControl)
-
-if __name__ == "__main__":
-    raise SystemExit(main())

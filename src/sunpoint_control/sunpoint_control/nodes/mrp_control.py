@@ -31,6 +31,3 @@ class MrpControl(Controller):
 
 
 main = node_main(MrpControl)
-
-if __name__ == "__main__":
-    raise SystemExit(main())
