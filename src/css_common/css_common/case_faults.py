@@ -8,7 +8,7 @@ changes no other.
 import math
 import zlib
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -55,32 +55,58 @@ def _as_it_is(fault: CaseFault, seed: Seed) -> CaseFault:
     return fault
 
 
-def case_faults(
-    lines: Iterable[str],
-    kinds: Sequence[FaultKind],
-    units: Units,
-    sorts: Mapping[str, int],
-    key: RandomKey,
-    period: float,
-    drawn: Callable[[CaseFault, Seed], CaseFault] = _as_it_is,
-) -> list[CaseFault]:
-    """Faults of one case, in the order of their lines; as many for all cases, some of which may never act.
+class CaseFaults:
+    """The faults of one case while the lines of its node change.
 
-    Args:
-        lines: checked ones.
-        kinds: that the units may have.
-        sorts: their codes.
-        key: of the case.
-        period: control cycle [s].
-        drawn: draws what a kind has drawn for each unit.
+    A line is parsed and drawn when it comes, not again with each that follows, or so many that are injected would cost
+    the square of their number.
     """
-    faults: list[CaseFault] = []
-    seen: Counter[str] = Counter()
-    for line in lines:
-        seed = Seed(key, zlib.crc32(f"{line} {seen[line]}".encode()))
-        seen[line] += 1
-        faults += (drawn(fault, seed) for fault in _faults_of(line, kinds, units, sorts, seed, period))
-    return faults
+
+    def __init__(
+        self,
+        kinds: Sequence[FaultKind],
+        units: Units,
+        sorts: Mapping[str, int],
+        key: RandomKey,
+        period: float,
+        drawn: Callable[[CaseFault, Seed], CaseFault] = _as_it_is,
+    ) -> None:
+        """Begins without any.
+
+        Args:
+            kinds: that the units may have.
+            units: that may fail.
+            sorts: codes of the kinds' sorts.
+            key: of the case.
+            period: control cycle [s].
+            drawn: draws what a kind has drawn for each unit.
+        """
+        self._kinds, self._units, self._sorts = kinds, units, sorts
+        self._key, self._period, self._drawn = key, period, drawn
+        self._known: dict[tuple[str, int], tuple[CaseFault, ...]] = {}
+
+    def of(self, lines: list[str]) -> list[CaseFault]:
+        """Faults in the order of their lines; as many for all cases, some of which may never act.
+
+        Args:
+            lines: checked ones, all that there are: what was known of others is forgotten.
+        """
+        known, self._known = self._known, {}
+        faults: list[CaseFault] = []
+        seen: Counter[str] = Counter()
+        for line in lines:
+            place = line, seen[line]
+            seen[line] += 1
+            found = known.get(place)
+            self._known[place] = found = self._of(*place) if found is None else found
+            faults += found
+        return faults
+
+    def _of(self, line: str, before: int) -> tuple[CaseFault, ...]:
+        """Faults of a line that so many of the same text stand before."""
+        seed = Seed(self._key, zlib.crc32(f"{line} {before}".encode()))
+        found = _faults_of(line, self._kinds, self._units, self._sorts, seed, self._period)
+        return tuple(self._drawn(fault, seed) for fault in found)
 
 
 def step_of(time_s: float, period: float) -> int:

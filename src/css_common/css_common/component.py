@@ -7,7 +7,7 @@ same component without a node, which is why a replayed estimator gives the bytes
 """
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -349,15 +349,21 @@ def missing_values(component_type: type[Component], values: Values) -> Iterator[
     return missing(component_type.table(), values, component_type.asked_for(values))
 
 
-def all_conflicts(component_type: type[Component], values: Values, name: str) -> Iterator[str]:
-    """What is wrong between the values of a component; what is missing comes first, for the rest builds on it."""
+def all_conflicts(
+    component_type: type[Component], values: Values, name: str, in_force: Collection[str] = ()
+) -> Iterator[str]:
+    """What is wrong between the values of a component; what is missing comes first, for the rest builds on it.
+
+    Args:
+        in_force: lines of faults that it has already: they are not parsed again with every parameter that is set.
+    """
     yield from missing_values(component_type, values)
     yield from conflicts(values)
     if component_type.fault_kinds:
-        yield from fault_lines.conflicts(
-            values[fault_lines.FAULTS], component_type.fault_kinds, component_type.fault_units(values)
-        )
+        units = component_type.fault_units(values)
+        lines = values[fault_lines.FAULTS]
+        yield from fault_lines.conflicts(lines, component_type.fault_kinds, units, in_force=in_force)
     if values[LINK_FAULTS]:
         units = component_type.link_units(name, values)
-        yield from fault_lines.conflicts(values[LINK_FAULTS], link_kinds.KINDS, units, LINK_FAULTS.name)
+        yield from fault_lines.conflicts(values[LINK_FAULTS], link_kinds.KINDS, units, LINK_FAULTS.name, in_force)
     yield from component_type.conflicts(values)

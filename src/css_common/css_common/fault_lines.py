@@ -8,7 +8,7 @@ takes the faults themselves as the parameter `faults`, a list of lines. A missio
 
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -48,6 +48,7 @@ class FaultValue(NamedTuple):
     parameter: Parameter[float]
     factor: float = 1.0
     cycles: int = 0  # power of the period: 1 for what is given per second, -1 for times
+    names_unit: bool = False  # the number of another unit of the sort
 
 
 class FaultKind(NamedTuple):
@@ -101,10 +102,19 @@ def parse_line(line: str, kinds: Iterable[FaultKind], units: Units) -> FaultLine
         raise ValueError(f"{shown(line)}: {error}") from error
     except (KeyError, ValueError) as error:
         raise ValueError(f"{shown(line)} is no fault, expected {expected} in {FORM}") from error
+    _check_named(line, kind, values, len(units[sort]))
     start_s, end_s = times.get("from", 0.0), times.get("to", math.inf)
     if not start_s < end_s:
         raise ValueError(f"{shown(line)}: to {end_s:g} given, expected later than {start_s:g}, when it begins")
     return FaultLine(kind, chosen, drawn, values, start_s, end_s, times.get("chance", 1.0), times.get("within", 0.0))
+
+
+def _check_named(line: str, kind: FaultKind, values: Sequence[float], count: int) -> None:
+    """Refuses numbers of units that there are not."""
+    for v, value in zip(kind.values, values, strict=True):
+        if v.names_unit and value not in range(count):
+            given = f"{v.parameter.name} {value:g} given"
+            raise ValueError(f"{shown(line)}: {given}, expected a {kind.sort} from 0 to {count - 1}")
 
 
 def line_of(target: str, kind: str, values: Iterable[float], times: Mapping[str, float]) -> str:
@@ -120,10 +130,18 @@ def _digits(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def conflicts(lines: list[str], kinds: Iterable[FaultKind], units: Units, name: str = "faults") -> Iterable[str]:
-    """What is wrong with the lines of a node's parameter, one message each."""
+def conflicts(
+    lines: list[str],
+    kinds: Iterable[FaultKind],
+    units: Units,
+    name: str = "faults",
+    in_force: Collection[str] = (),
+) -> Iterable[str]:
+    """What is wrong with the lines of a node's parameter, one message each; those in force were looked at before."""
     kinds = tuple(kinds)
     for line in lines:
+        if line in in_force:
+            continue
         try:
             parse_line(line, kinds, units)
         except ValueError as error:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from css_common.case_faults import CaseFault, Seed, Teller, case_faults
+from css_common.case_faults import CaseFault, CaseFaults, Seed, Teller
 from css_common.codec import Sample
 from css_common.component import TOLD, Component
 from css_common.fault_lines import Units
@@ -81,6 +81,11 @@ class Link:
         """
         self._component = component
         self._units = units
+        values = component.values
+        self._key = random_key(values[SEED], values[CASE])
+        self._of_all, self._of_process = (
+            CaseFaults(KINDS, units, SORTS, self._key, values[PERIOD], _at_once) for _ in range(2)
+        )
         self._done: frozenset[str] = frozenset()
         self.tells = TOLD in component.frames
         self._teller = Teller()
@@ -94,15 +99,12 @@ class Link:
 
     def take(self) -> None:
         """Has the faults of the component's values from now on."""
-        values = self._component.values
-        self._key = random_key(values[SEED], values[CASE])
-        lines = [line for line in values[LINK_FAULTS] if line not in self._done]
-
-        def faults_of(given: list[str]) -> list[CaseFault]:
-            return case_faults(given, KINDS, self._units, SORTS, self._key, values[PERIOD], _at_once)
-
-        self.faults = faults_of(lines)
-        self.of_process = [(line, fault) for line in of_sorts(lines, "process") for fault in faults_of([line])]
+        lines = [line for line in self._component.values[LINK_FAULTS] if line not in self._done]
+        self.faults = self._of_all.of(lines)
+        of_process = of_sorts(lines, "process")
+        apart = list(dict.fromkeys(of_process))
+        told = dict(zip(apart, self._of_process.of(apart), strict=True))  # a node is one process
+        self.of_process = [(line, told[line]) for line in of_process]
 
     @property
     def is_quiet(self) -> bool:

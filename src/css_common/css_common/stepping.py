@@ -15,7 +15,9 @@ import numpy as np
 
 from css_common.codec import Codec, Sample
 from css_common.component import Component, Cycles, Outgoing, Output, Received, all_conflicts
+from css_common.fault_lines import FAULTS
 from css_common.link import GAP, Link, gap
+from css_common.link_kinds import LINK_FAULTS
 from css_common.message_columns import unstack
 from css_common.mission import Event
 from css_common.schema import ParameterError, shaped_values
@@ -38,10 +40,22 @@ def first_step(event: Event, period_ns: int) -> int:
     return step
 
 
-def conflict(component_type: type[Component], canonical: Mapping[str, Any], name: str) -> str | None:
-    """The first thing that is wrong between values that are each sane, or None."""
+def conflict(
+    component_type: type[Component], canonical: Mapping[str, Any], name: str, in_force: Mapping[str, Any] | None = None
+) -> str | None:
+    """The first thing that is wrong between values that are each sane, or None.
+
+    Args:
+        in_force: values of the same node that were checked before; their faults are not parsed again.
+    """
     values = shaped_values(component_type.table(), canonical)
-    return next(all_conflicts(component_type, values, name), None)
+    lines = () if in_force is None else fault_lines_of(in_force)
+    return next(all_conflicts(component_type, values, name, lines), None)
+
+
+def fault_lines_of(canonical: Mapping[str, Any]) -> frozenset[str]:
+    """The lines of all faults of a node."""
+    return frozenset(line for p in (FAULTS, LINK_FAULTS) for line in canonical.get(p.name, ()))
 
 
 class Port(NamedTuple):
@@ -264,7 +278,7 @@ class Stepper:
 
     def refusal(self, canonical: Mapping[str, Any]) -> str | None:
         """Why it cannot take values that are each sane: the first thing that is wrong between them, or None."""
-        reason = conflict(type(self.component), canonical, self.component.name)
+        reason = conflict(type(self.component), canonical, self.component.name, self.canonical)
         return reason or self.component.untimely(shaped_values(self.component.table(), canonical))
 
     def tune(self, changes: Mapping[str, Any]) -> None:

@@ -56,4 +56,4 @@ def _faults_of(node: Node, key: RandomKey) -> list[CaseFault]:
         return cell_faults.case_faults(values, key)  # with those that are drawn without a line
     if not kind.fault_kinds:
         return []
-    return faults.case_faults(values[FAULTS], kind.fault_kinds, kind.fault_units(values), key, values[PERIOD])
+    return faults.of_case(kind.fault_kinds, kind.fault_units(values), key, values[PERIOD]).of(values[FAULTS])

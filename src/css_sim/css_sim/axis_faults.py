@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults of sensors of three axes: gyro and magnetometer."""
 
-from css_common.case_faults import CaseFault
+from css_common.case_faults import CaseFault, CaseFaults
 from css_common.fault_lines import FAULTS, Units
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
@@ -18,6 +18,11 @@ def units(sort: str) -> Units:
     return {sort: AXES}
 
 
+def of_case(values: Values, sort: str, key: RandomKey) -> CaseFaults:
+    """The faults of one case of a `gyro` or a `magnetometer`, by the lines that there are."""
+    return faults.of_case(kinds_of(sort), units(sort), key, values[PERIOD])
+
+
 def case_faults(values: Values, sort: str, key: RandomKey) -> list[CaseFault]:
     """Faults of one case of a `gyro` or a `magnetometer`."""
-    return faults.case_faults(values[FAULTS], kinds_of(sort), units(sort), key, values[PERIOD])
+    return of_case(values, sort, key).of(values[FAULTS])

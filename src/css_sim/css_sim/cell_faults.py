@@ -1,22 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Failed coarse sun sensor cells of one case: those of the node's lines, and so many different ones that are drawn."""
 
-import contextlib
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from css_common.case_faults import NEVER, CaseFault, step_of
+from css_common.case_faults import NEVER, CaseFault, CaseFaults, step_of
 from css_common.declared import builder, given, part, table_of
-from css_common.fault_lines import FAULTS, Units, parse_line
+from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values, choice, integer, real
 from css_common.sections import PERIOD
 from css_sensors.cells import NORMALS
 from css_sim import faults
-from css_sim.fault_effects import CELL, DEAD, SHADOWED, STUCK, SWAPPED, acts
+from css_sim.fault_effects import CELL, DEAD, SHADOWED, STUCK, acts
 from css_sim.fault_kinds import kinds_of
 
 KINDS = kinds_of("cell")
@@ -77,17 +76,23 @@ def drawn_faults(p: RandomFaults, cells: int, key: RandomKey, period: float) -> 
     return failed
 
 
-def case_faults(values: Values, key: RandomKey) -> list[CaseFault]:
+def of_case(values: Values, key: RandomKey) -> CaseFaults:
+    """The failures of one case, by the lines that there are."""
+    return faults.of_case(KINDS, units(values), key, values[PERIOD])
+
+
+def case_faults(values: Values, key: RandomKey, known: CaseFaults | None = None) -> list[CaseFault]:
     """Failures of one case: those of the lines, then those drawn. There are as many of them in all cases.
 
     A later one acts on what an earlier one left.
 
     Args:
         values: checked ones (`PARAMETERS`, the mission and its cells).
+        known: of the case, where lines come one by one.
     """
-    p, period = parameters(values), values[PERIOD]
-    scripted = faults.case_faults(p.faults, KINDS, units(values), key, period)
-    return scripted + drawn_faults(p.random, len(values[NORMALS]), key, period)
+    p = parameters(values)
+    scripted = (known or of_case(values, key)).of(p.faults)
+    return scripted + drawn_faults(p.random, len(values[NORMALS]), key, values[PERIOD])
 
 
 def conflicts(values: Values) -> Iterator[str]:
@@ -95,11 +100,6 @@ def conflicts(values: Values) -> Iterator[str]:
     p, cell_count = parameters(values), len(values[NORMALS])
     if p.random.cells > cell_count:
         yield f"random_faults.count: {p.random.cells} given, expected at most the number of cells, {cell_count}"
-    for line in p.faults:
-        with contextlib.suppress(ValueError):  # of the form, which is said elsewhere
-            fault = parse_line(line, KINDS, units(values))
-            if fault.kind.code == SWAPPED and fault.values[0] not in range(cell_count):
-                yield f"faults: {line!r}: other {fault.values[0]:g} given, expected a cell from 0 to {cell_count - 1}"
 
 
 @kernel

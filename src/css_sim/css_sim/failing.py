@@ -40,6 +40,8 @@ class Failing:
 
     def take(self, faults: Sequence[CaseFault]) -> None:
         """Has other faults from now on; a frozen unit that stays frozen stays where it is."""
+        if faults == self._faults:  # another parameter was set
+            return
         self._faults = faults
         self.table = with_held(rows(faults), self.table)
 

@@ -78,7 +78,7 @@ _CELL_KINDS = (
         "cell",
         "swapped",
         effects.SWAPPED,
-        (FaultValue(real("other", 0.0, "-", "", low=0.0, high=31.0)),),
+        (FaultValue(real("other", 0.0, "-", "", low=0.0, high=31.0), names_unit=True),),
         "exchanged with the cell of this number",
     ),
     FaultKind("cell", "shadowed", effects.SHADOWED, (_SHARE,), "this share of all light is kept from it"),

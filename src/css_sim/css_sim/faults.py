@@ -6,8 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from css_common import case_faults as of_lines
-from css_common.case_faults import CaseFault, Seed
+from css_common.case_faults import CaseFault, CaseFaults, Seed
 from css_common.fault_lines import FaultKind, Units
 from css_common.random_streams import RandomKey
 from css_sim import fault_effects as effects
@@ -15,16 +14,13 @@ from css_sim.fault_effects import FAULT
 from css_sim.fault_kinds import SORTS
 
 
-def case_faults(
-    lines: list[str], kinds: Sequence[FaultKind], units: Units, key: RandomKey, period: float
-) -> list[CaseFault]:
-    """Faults of one case, in the order of their lines; as many for all cases, some of which may never act.
+def of_case(kinds: Sequence[FaultKind], units: Units, key: RandomKey, period: float) -> CaseFaults:
+    """The faults of one case, by the lines that there are.
 
     Args:
-        lines: checked ones.
         period: control cycle [s].
     """
-    return of_lines.case_faults(lines, kinds, units, SORTS, key, period, _drawn)
+    return CaseFaults(kinds, units, SORTS, key, period, _drawn)
 
 
 def _drawn(fault: CaseFault, seed: Seed) -> CaseFault:
@@ -39,12 +35,12 @@ def _drawn(fault: CaseFault, seed: Seed) -> CaseFault:
 def rows(faults: Sequence[CaseFault]) -> np.ndarray:
     """Array (F,) of FAULT of the faults of one node, whose draws hang on their places among them."""
     table = np.zeros(len(faults), FAULT)
-    for place, (row, fault) in enumerate(zip(table, faults, strict=True)):
-        row["index"] = (fault.sort << 16) + place
-        row["sort"], row["unit"], row["kind"] = fault.sort, fault.unit, fault.kind
-        row["value"], row["second"] = (*fault.scaled, 0.0, 0.0)[:2]
-        row["first_step"], row["end_step"] = fault.first_step, fault.end_step
-        row["held"] = math.nan
+    table["index"] = [(fault.sort << 16) + place for place, fault in enumerate(faults)]
+    for name in ("sort", "unit", "kind", "first_step", "end_step"):
+        table[name] = [getattr(fault, name) for fault in faults]
+    for k, name in enumerate(("value", "second")):
+        table[name] = [fault.scaled[k] if k < len(fault.scaled) else 0.0 for fault in faults]
+    table["held"] = math.nan
     return table
 
 
@@ -54,8 +50,10 @@ def with_held(table: np.ndarray, before: np.ndarray, anew: Collection[int] = ())
     Args:
         anew: sorts of units that know nothing of before.
     """
-    known = {_identity(row): row["held"] for row in before if row["sort"] not in anew}
-    for row in table:
+    holding = before[~np.isnan(before["held"])]
+    known = {_identity(row): row["held"] for row in holding if row["sort"] not in anew}
+    table["held"] = math.nan
+    for row in table if known else ():  # as nearly always none
         row["held"] = known.get(_identity(row), math.nan)
     return table
 

@@ -5,7 +5,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from css_common.case_faults import CaseFault
+from css_common.case_faults import CaseFault, CaseFaults
 from css_common.fault_lines import FAULTS, Units
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values
@@ -42,9 +42,14 @@ def units(values: Values) -> Units:
     return {"head": [str(i) for i in range(len(values[HEAD_AZIMUTHS]))]}
 
 
+def of_case(values: Values, key: RandomKey) -> CaseFaults:
+    """The faults of one case, by the lines that there are."""
+    return faults.of_case(KINDS, units(values), key, values[PERIOD])
+
+
 def case_faults(values: Values, key: RandomKey) -> list[CaseFault]:
     """Faults of one case."""
-    return faults.case_faults(values[FAULTS], KINDS, units(values), key, values[PERIOD])
+    return of_case(values, key).of(values[FAULTS])
 
 
 class FaultyHeads:

@@ -8,6 +8,7 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
+from css_common.fault_lines import conflicts
 from css_common.random_streams import random_key
 from css_common.sections import MISSION
 from css_sensors.cells import CELLS
@@ -46,7 +47,8 @@ def test_conflicts_name_the_fault():
     assert list(cell_faults.conflicts(values_with(["0 dead", "7 stuck 1.0"], count=8))) == []
     (many,) = cell_faults.conflicts(values_with(count=9))
     assert many == "random_faults.count: 9 given, expected at most the number of cells, 8"
-    (other,) = cell_faults.conflicts(values_with(["1 swapped 8", "2 swapped 7"]))
+    values = values_with(["1 swapped 8", "2 swapped 7"])
+    (other,) = conflicts(values.faults, cell_faults.KINDS, cell_faults.units(values))
     assert "other 8 given, expected a cell from 0 to 7" in other
 
 

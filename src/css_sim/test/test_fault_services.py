@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faults that are injected into running nodes and cleared again, by services of the nodes."""
 
+from collections import Counter
+
 import numpy as np
 import pytest
+from rclpy.parameter import Parameter
 
+from css_common import fault_lines
 from css_common.codec import Sample, codec_of
 from css_common.mission import load_mission
 from css_common.schema import shaped_values
@@ -66,6 +70,29 @@ def test_cleared_faults_are_gone(paused):
     assert nodes["css_array"].component.values.faults == []
     answer = clear(bench, "css_array", "cell.1")
     assert not answer.success and "expected none" in answer.message
+
+
+def test_a_line_is_parsed_when_it_comes_and_not_with_every_one_that_follows(paused, monkeypatch):
+    bench, _, nodes = paused
+    parsed: Counter[str] = Counter()
+    target_of = fault_lines._target
+
+    def counted(word, units):
+        parsed[word] += 1
+        return target_of(word, units)
+
+    monkeypatch.setattr(fault_lines, "_target", counted)
+    targets = {"css_array": ("cell.any", "stuck", [0.5]), "gyro": ("clock.gyro", "step", [0.1])}
+    for node, (target, kind, values) in targets.items():
+        for duration in range(1, 31):
+            assert inject(bench, node, target, kind, values, float(duration)).success
+        assert 30 <= parsed[target] <= 4 * 30  # asked for, checked, drawn
+    before = sum(parsed.values())
+    for node, name, value in (("css_array", "noise", 0.02), ("gyro", "io.deadline", 0.7)):
+        (result,) = nodes[node].set_parameters([Parameter(name, value=value)])
+        assert result.successful, result.reason
+    assert sum(parsed.values()) == before
+    assert len(nodes["css_array"].component._failing.table) == len(nodes["gyro"].stepper.link.faults) == 30
 
 
 @pytest.mark.parametrize(

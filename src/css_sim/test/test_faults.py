@@ -20,7 +20,7 @@ from css_msgs.msg import Faults, SpacecraftState
 from css_sim import fault_effects as effects
 from css_sim.actuator_faults import new_felt, spoil_actuators
 from css_sim.fault_kinds import AXES, KINDS, SORTS, kinds_of
-from css_sim.faults import case_faults, rows
+from css_sim.faults import of_case, rows
 from css_sim.nodes.css_array import CssArray
 from css_sim.rigid_body import rigid_body
 
@@ -52,7 +52,7 @@ NOT_OF_COMMANDS = {("wheel", "dead"), ("wheel", "saturated"), ("head", "dead")}
 
 
 def lines_of(*lines, kinds=KINDS, key=KEY):
-    return rows(case_faults(list(lines), kinds, UNITS, key, PERIOD))
+    return rows(of_case(kinds, UNITS, key, PERIOD).of(list(lines)))
 
 
 def line(kind, unit=1, times="from 1"):

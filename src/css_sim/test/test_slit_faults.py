@@ -23,7 +23,7 @@ UNITS = {"head": ["0", "1"]}
 
 
 def heads(*lines, key=KEY):
-    failing = faults.case_faults(list(lines), kinds_of("head"), UNITS, key, PERIOD)
+    failing = faults.of_case(kinds_of("head"), UNITS, key, PERIOD).of(list(lines))
     return FaultyHeads(failing, key, FREQUENCY)
 
 

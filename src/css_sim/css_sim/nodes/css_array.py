@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 
 from css_common.attitude import mrp_to_dcm
+from css_common.case_faults import CaseFault
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.fault_lines import Units
 from css_common.kernel import typed_call
@@ -107,7 +108,8 @@ class CssArray(Component):
         nominal = cell_errors.nominal_cells(values[NORMALS], cell_screen.cell_sides(values))
         cells = nominal.copy()
         cell_errors.draw_cells(cell_errors.error_model(values), self._key, nominal, cells)
-        self._failing = Failing(cell_faults.case_faults(values, self._key), self._failing)
+        self._faults = cell_faults.of_case(values, self._key)
+        self._failing = Failing(self._case_faults(), self._failing)
         self._cells = CellsOfCase(cells, self._failing.table, np.zeros(len(cells)), new_workspace())
         grid = earth_reflectivity.source(values, self.epoch_ns)
         self._reflectivity = earth_reflectivity.case_reflectivity(values, grid, self._key)
@@ -129,8 +131,11 @@ class CssArray(Component):
     def tune(self, values: Values) -> None:
         super().tune(values)
         self._p = sun_cells.parameters(values)
-        self._failing.take(cell_faults.case_faults(values, self._key))
+        self._failing.take(self._case_faults())
         self._cells = self._cells._replace(faults=self._failing.table)
+
+    def _case_faults(self) -> list[CaseFault]:
+        return cell_faults.case_faults(self.values, self._key, self._faults)
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         truth = received["truth"]

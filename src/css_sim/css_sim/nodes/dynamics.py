@@ -124,7 +124,8 @@ class Dynamics(Plant):
         values = self.values
         self._key = key = random_key(values[SEED], values[CASE])
         self._craft = spacecraft(values, key, values[_SUBSTEPS])
-        self._failing = Failing(actuator_faults.case_faults(values, key))
+        self._faults = actuator_faults.of_case(values, key)
+        self._failing = Failing(self._faults.of(values[FAULTS]))
         self._take_faults()
         self._environment = flight_environment.flight_environment(
             values, orbit=orbit_dispersion.case_orbit(values, key)
@@ -148,7 +149,7 @@ class Dynamics(Plant):
 
     def tune(self, values: Values) -> None:
         super().tune(values)
-        self._failing.take(actuator_faults.case_faults(values, self._key))
+        self._failing.take(self._faults.of(values[FAULTS]))
         self._take_faults()
 
     def untimely(self, values: Values) -> str | None:

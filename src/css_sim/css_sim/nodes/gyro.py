@@ -9,7 +9,7 @@ from sensor_msgs.msg import Imu
 from css_common.case_faults import CaseFault
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
-from css_common.fault_lines import Units
+from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import typed_call
 from css_common.mission import Node
 from css_common.random_streams import random_key
@@ -59,6 +59,7 @@ class Gyro(Component):
 
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
+        self._faults = axis_faults.of_case(self.values, "gyro", self._key)
         self._failing = Failing(self._case_faults(), self._failing)
         self._take_noise()
         self._errors = gyro.draw_errors(self._p, self._key)
@@ -75,7 +76,7 @@ class Gyro(Component):
         self._covariance = (gyro.variance(self._p) * np.eye(3)).ravel()
 
     def _case_faults(self) -> list[CaseFault]:
-        return axis_faults.case_faults(self.values, "gyro", self._key)
+        return self._faults.of(self.values[FAULTS])
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         step = self.step_of(stamp_ns)

@@ -10,7 +10,7 @@ from css_common.attitude import mrp_to_dcm
 from css_common.case_faults import CaseFault
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
-from css_common.fault_lines import Units
+from css_common.fault_lines import FAULTS, Units
 from css_common.mission import Node
 from css_common.random_streams import random_key
 from css_common.run import node_main
@@ -65,6 +65,7 @@ class Magnetometer(Component):
 
     def configure(self) -> None:
         self._key = random_key(self.values[SEED], self.values[CASE])
+        self._faults = axis_faults.of_case(self.values, "magnetometer", self._key)
         self._failing = Failing(self._case_faults(), self._failing)
         self._take_noise()
         self._bias_b = magnetometer.draw_bias(self._p, self._key)
@@ -80,7 +81,7 @@ class Magnetometer(Component):
         self._covariance = (magnetometer.variance(self._p) * np.eye(3)).ravel()
 
     def _case_faults(self) -> list[CaseFault]:
-        return axis_faults.case_faults(self.values, "magnetometer", self._key)
+        return self._faults.of(self.values[FAULTS])
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         step = self.step_of(stamp_ns)

@@ -8,7 +8,7 @@ import numpy as np
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
-from css_common.fault_lines import Units
+from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import typed_call
 from css_common.random_streams import random_key
 from css_common.run import node_main
@@ -62,7 +62,8 @@ class SlitSensor(Component):
         values = self.values
         self._key = random_key(values[SEED], values[CASE])
         self._timer = slit_timer.parameters(values)
-        faults = slit_faults.case_faults(values, self._key)
+        self._faults = slit_faults.of_case(values, self._key)
+        faults = self._faults.of(values[FAULTS])
         self._failing = Failing(faults, self._failing)
         self._heads_in_flight = FaultyHeads(faults, self._key, self._timer.frequency)
         self._motion = payload_motion(values, self.epoch_ns, self._key)
@@ -80,7 +81,7 @@ class SlitSensor(Component):
     def tune(self, values: Values) -> None:
         super().tune(values)
         self._timer = slit_timer.parameters(values)
-        faults = slit_faults.case_faults(values, self._key)
+        faults = self._faults.of(values[FAULTS])
         self._failing.take(faults)
         self._heads_in_flight.faults = faults
 
