@@ -19,8 +19,8 @@ FLOORS = (
     {"css_sim", "css_estimation", "sunpoint_control", "css_drivers", "css_telemetry"},
     {"css_analysis"},
     {"css_report", "css_viewers"},
-    {"css_bringup", "css_calibration", "css_monte_carlo"},
-    {"css_papers", "css_design", "css_export", "css_console"},
+    {"css_bringup", "css_monte_carlo"},
+    {"css_papers", "css_design", "css_calibration", "css_export", "css_console"},
     {"css_docs"},
 )
 # rooms inside css_estimation, and which others each may enter: an attitude filter needs to know the cells, the Sun

@@ -75,17 +75,20 @@ def without_truth(flight: Flown) -> Recorded:
 
 def sun_alone(flight: Flown) -> Recorded:
     """What imported telemetry with the Sun in the body has: cells, rates, Sun, no place."""
-    truth = flight.columns["truth"]
-    sun_b = flight.recorded.sun_b
-    assert sun_b is not None
-    zeros = np.zeros((len(truth), 3))
-    fields = vars(truth) | {"sun_n": sun_b, "sigma_bn": zeros, "r_n": zeros}
     given = flight.mission.parameters["/**"]
     known = {key: value for key, value in given.items() if key.split(".")[0] in ("mission", "cells")}
     mission = mission_from_text(dump_sections({"/**": known}), "telemetry")
     kinds = flight.mission.topics
     by_type = {kinds[t]: c for t, c in flight.columns.items() if t not in ("truth", "mag/field")}
-    return recorded_of("telemetry", mission, by_type | {SpacecraftState: Columns(**fields)}, [])
+    return recorded_of("telemetry", mission, by_type | {SpacecraftState: sun_truth(flight)}, [])
+
+
+def sun_truth(flight: Flown) -> Columns:
+    """A truth that knows the Sun in the body alone, as that of imported telemetry does."""
+    truth, sun_b = flight.columns["truth"], flight.recorded.sun_b
+    assert sun_b is not None
+    zeros = np.zeros((len(truth), 3))
+    return Columns(**vars(truth) | {"sun_n": sun_b, "sigma_bn": zeros, "r_n": zeros})
 
 
 def true_parameters(mission: Mission) -> np.ndarray:

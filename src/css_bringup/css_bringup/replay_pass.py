@@ -7,6 +7,7 @@ matching of stamps and the same scripted events. The estimator that flew therefo
 
 import time
 from collections.abc import Callable, Iterable, Mapping
+from typing import Protocol
 
 from css_bringup.comparison import Comparison
 from css_bringup.estimator_request import EstimatorRequest, parse_request
@@ -19,7 +20,6 @@ from css_common.mission import Mission, mission_from_text
 from css_common.mission_file import MissionError
 from css_recording.bag_metadata import Topic, absolute
 from css_recording.bag_reader import BagMessage, BagReader
-from css_recording.bag_writer import BagWriter
 from css_recording.parameter_events import PARAMETER_EVENTS, RecordedSetting, read_setting
 
 __all__ = ["EstimatorRequest", "Replay", "parse_request"]
@@ -27,6 +27,16 @@ __all__ = ["EstimatorRequest", "Replay", "parse_request"]
 
 LONG = 10_000
 """Messages of an input from which on it is worth loading the loops that take many at once."""
+
+
+class Taker(Protocol):
+    """What takes the estimates of a replay: a new recording, or who looks at them at once."""
+
+    def add_topic(self, topic: Topic) -> None:
+        """Announces a topic before its first message."""
+
+    def write(self, topic: str, stamp_ns: int, data: bytes) -> None:
+        """Takes a message."""
 
 
 class Replay:
@@ -104,7 +114,7 @@ class Replay:
                     kinds[kind] = max(count, kinds.get(kind, 0))
         return {topic: kinds for topic, kinds in counted.items() if kinds}
 
-    def run(self, writer: BagWriter | None, copied: Iterable[str] = ("/truth",)) -> float:
+    def run(self, writer: Taker | None, copied: Iterable[str] = ("/truth",)) -> float:
         """Reads the recording once; returns the processor time of reading and stepping [s].
 
         Args:
@@ -128,7 +138,7 @@ class Replay:
     def _is_long(self) -> bool:
         return any(self._counts.get(topic, 0) >= self.long_from for topic in self._listeners)
 
-    def _leap(self, part: list[BagMessage], writer: BagWriter | None, copied: frozenset[str]) -> bool:
+    def _leap(self, part: list[BagMessage], writer: Taker | None, copied: frozenset[str]) -> bool:
         """Takes an ordinary part of the recording at once; False: nothing of it is taken, as it is none."""
         stretch = Stretch.of(part, self._listeners, self.runs)
         if stretch is None:
@@ -148,7 +158,7 @@ class Replay:
                     message = next(waiting, None)
         return True
 
-    def _walk(self, messages: Iterable[BagMessage], writer: BagWriter | None, copied: frozenset[str]) -> None:
+    def _walk(self, messages: Iterable[BagMessage], writer: Taker | None, copied: frozenset[str]) -> None:
         """Takes messages one by one."""
         for message in messages:
             if writer is not None and message.topic in copied:
@@ -162,9 +172,7 @@ class Replay:
                     for stamp_ns, received in run.matcher.offer(edge.source.key, sample):
                         self._step(run, stamp_ns, received, writer)
 
-    def _step(
-        self, run: Replayed, stamp_ns: int, received: Mapping[str, Sample | None], writer: BagWriter | None
-    ) -> None:
+    def _step(self, run: Replayed, stamp_ns: int, received: Mapping[str, Sample | None], writer: Taker | None) -> None:
         for port, sample, data in run.step(stamp_ns, received):
             if writer is not None:
                 writer.write(run.topics[port.key], sample.stamp_ns, data)
@@ -180,7 +188,7 @@ class Replay:
         elif stamp_ns < self.first_ns:
             self.first_ns = stamp_ns
 
-    def _announce(self, writer: BagWriter, copied: Iterable[str]) -> None:
+    def _announce(self, writer: Taker, copied: Iterable[str]) -> None:
         for topic in sorted(copied):
             writer.add_topic(Topic(topic, self._recorded[topic]))
         for run in self.runs:

@@ -13,6 +13,7 @@ scales. The covariance of the result is scaled by what sums of white residuals o
 expectation, and has the light of an Earth that nobody predicts for all of the recording (Huber's sandwich).
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +31,7 @@ OUTLIER = 5.0
 _SOFT = 2.0
 _PASSES = 2  # with a square loss
 _TOLERANCE = 1e-6
+_MEAN_SHARE = math.sqrt(0.5)  # of the root mean square of a light whose mean is as large as its changes
 
 
 @dataclass
@@ -48,6 +50,8 @@ class Fit:
         noise: of the outputs.
         slow: factor on the standard deviations by residuals that last.
         cost: half the sum of squares.
+        beside_earth: `x` and `covariance` where the light of an Earth that nobody predicts is sought as well; None:
+            it is predicted.
     """
 
     unknowns: Unknowns
@@ -60,6 +64,7 @@ class Fit:
     noise: Noise
     slow: float
     cost: float
+    beside_earth: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def parameters(self) -> np.ndarray:
@@ -201,7 +206,7 @@ def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: n
             outliers = counts & (np.abs(off) > OUTLIER * sigma)
     problem = _Problem(data, unknowns, track, counts & ~outliers, noise)
     problem.weigh(x, whole=True)
-    covariance, of_outputs, information, slow = _covariance(problem, x)
+    covariance, of_outputs, information, slow, beside_earth = _covariance(problem, x)
     return Fit(
         unknowns,
         x,
@@ -213,6 +218,7 @@ def fit(data: CellData, unknowns: Unknowns, track: Track | None = None, start: n
         noise,
         slow,
         float(result.cost),
+        beside_earth,
     )
 
 
@@ -238,17 +244,43 @@ def _off(problem: _Problem, x: np.ndarray, counts: np.ndarray) -> tuple[np.ndarr
     return np.where(counts, out - data.voltages, 0.0), out, slopes[:, :, EARTH], parameters
 
 
-def _covariance(problem: _Problem, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """That of all errors, that of predicted outputs, the normal matrix of the data, and the factor of slow errors."""
+def _covariance(
+    problem: _Problem, x: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, tuple[np.ndarray, np.ndarray] | None]:
+    """Those of all errors and of predicted outputs, normal matrix, factor of slow errors, `Fit.beside_earth`."""
     jacobian = problem.of_data(x)
     count = len(problem.rows)
     of_cells, others = jacobian[:count], jacobian[count:]
     information = jacobian.T @ jacobian
-    slow = slow_factor(problem.residuals(x)[:count], problem.data.time[problem.rows], problem.cells)
+    off = problem.residuals(x)[:count]
+    slow = slow_factor(off, problem.data.time[problem.rows], problem.cells)
     inverse = np.linalg.inv(information + np.eye(len(x)))
     of_outputs = inverse @ (slow**2 * of_cells.T @ of_cells + others.T @ others + np.eye(len(x))) @ inverse
-    covariance = of_outputs
-    if problem.noise.unknown > 0.0:
-        by_light = inverse @ of_cells.T @ problem.weighed(problem.noise.unknown * _earth_patterns(problem, x))
-        covariance = of_outputs + by_light @ by_light.T
-    return covariance, of_outputs, information, slow
+    if problem.noise.unknown == 0.0:
+        return of_outputs, of_outputs, information, slow, None
+    patterns = problem.weighed(problem.noise.unknown * _earth_patterns(problem, x))
+    by_light = inverse @ of_cells.T @ patterns
+    beside_earth = _beside_earth(of_cells, patterns, off, x, slow)
+    return of_outputs + by_light @ by_light.T, of_outputs, information, slow, beside_earth
+
+
+def _beside_earth(
+    jacobian: np.ndarray, patterns: np.ndarray, off: np.ndarray, x: np.ndarray, slow: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unknowns (P,) and their covariance, one step from where they are best without the light of the patterns.
+
+    Args:
+        jacobian: (K, P) of the outputs.
+        patterns: (K, Q) of the light on the outputs, in units of their errors and of what it may be.
+        off: (K,) expected less read, in the same units.
+        x: (P,) of a fit without it.
+        slow: factor on the errors of the outputs, which weigh by so much less.
+    """
+    whole, half = np.hstack([jacobian, patterns]) / slow, patterns.shape[1] // 2
+    # on cells away from the Sun, the first half: never below zero, with a mean as large as its changes are
+    away, facing = np.full(half, _MEAN_SHARE), np.ones(half)
+    precision = np.concatenate([np.ones(len(x)), away**-2, facing])
+    off_before = np.concatenate([x, -away, 0.0 * facing])
+    covariance = np.linalg.inv(whole.T @ whole + np.diag(precision))
+    change = -covariance @ (whole.T @ off / slow + precision * off_before)
+    return x + change[: len(x)], covariance[: len(x), : len(x)]

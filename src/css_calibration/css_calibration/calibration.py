@@ -2,7 +2,7 @@
 """Calibration of a whole recording: which reference it has, the batch, a part that is held out, and what came of it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -48,6 +48,7 @@ class Calibration:
         track: of a batch.
         bias, of_field: of gyro and magnetometer with a truth.
         holdout: (M,) instants that the numbers below come from; the fit behind these did not have their outputs.
+        trained: that fit; None: nothing is held out.
         before, after: (H,) [rad] errors of the heading there, with nominal cells and calibrated ones.
         notes: what was assumed, left out or could not be told, one line each.
     """
@@ -63,6 +64,7 @@ class Calibration:
     bias: Linear | None
     of_field: Linear | None
     holdout: np.ndarray
+    trained: Fit | None
     before: np.ndarray
     after: np.ndarray
     notes: list[str] = field(default_factory=list)
@@ -75,7 +77,7 @@ class Calibration:
     @property
     def parameters(self) -> np.ndarray:
         """(N, 5) of the cells; what the recording says nothing of is as the mission has it."""
-        return np.where(self.left < UNTOLD, self.fit.parameters, nominal_parameters(len(self.left)))
+        return told(self.fit).parameters
 
     @property
     def sigma(self) -> np.ndarray:
@@ -92,7 +94,7 @@ class Calibration:
             return None
         first = self.fit.unknowns.count
         sigma = np.sqrt(np.diag(self.fit.covariance))[first : first + COMMON] * COMMON_SIGMA
-        return self.track.common(self.fit.x[first:]), sigma
+        return self.track.common(told(self.fit).x[first:]), sigma
 
 
 def reference_of(recorded: Recorded, asked: str = "auto") -> str:
@@ -161,8 +163,8 @@ def calibrate(
     frame = _Frame(thin, around, kind, track, warmth)
     chosen, data, result = _best_curve(frame, curve, tell, notes)
     held = _held_out(data, holdout)
-    before, after = _worth(frame, chosen, data, result, held, tell)
-    left = _left(result)
+    trained, before, after = _worth(frame, chosen, data, result, held, tell)
+    left = left_of(result)
     bias = gyro_bias(recorded) if kind != BATCH else None
     of_field = magnetometer(thin, around) if kind == ATTITUDE else None
     if kind == SUN and recorded.field_b is not None:
@@ -170,7 +172,7 @@ def calibrate(
     if kind == SUN:
         notes.append("the light of the Earth is not predicted, for the place is not known: it is in the error bars")
     return Calibration(
-        thin, kind, chosen, warmth, data, result, left, track, bias, of_field, held, before, after, notes
+        thin, kind, chosen, warmth, data, result, left, track, bias, of_field, held, trained, before, after, notes
     )
 
 
@@ -207,7 +209,7 @@ class _Frame:
             same = before is not None and before.unknowns.earth == unknowns.earth
             before = fit(data, unknowns, self.track, before.x if same and before is not None else None)
         assert before is not None
-        return data, before
+        return data, _beside_earth(before)
 
     def _unknowns(self, data: CellData) -> Unknowns:
         if not data.usable.any():
@@ -217,6 +219,14 @@ class _Frame:
         varies = self.recorded.temperature is not None and float(np.std(self.recorded.temperature)) > _VARIES
         earth = bool(np.max(data.albedo, initial=0.0) > _EARTH_SHOWS)
         return all_of(data.voltages.shape[1], temperature=varies, earth=earth, ignorance=Ignorance())
+
+
+def _beside_earth(result: Fit) -> Fit:
+    """A fit that has looked for the light of an Earth that nobody predicts: it would pass for dark levels."""
+    if result.beside_earth is None:
+        return result
+    x, covariance = result.beside_earth
+    return replace(result, x=x, covariance=covariance)
 
 
 def _thinned(recorded: Recorded, kind: str) -> Recorded:
@@ -268,21 +278,35 @@ def _held_out(data: CellData, share: float) -> np.ndarray:
 
 def _worth(
     frame: _Frame, curve: str, data: CellData, result: Fit, held: np.ndarray, tell: Tell
-) -> tuple[np.ndarray, np.ndarray]:
-    """Errors of the heading over the part that is held out, by cells as the mission has them and as the rest tells."""
+) -> tuple[Fit | None, np.ndarray, np.ndarray]:
+    """What the rest tells, and errors of the heading over the part that is held out, by the mission and by it."""
     if not held.any() or held.all():
-        return np.zeros(0), np.zeros(0)
+        return None, np.zeros(0), np.zeros(0)
     tell("batch without the part that is held out")
     _, trained = frame.fitted(response_of(CURVES[curve]), ~held[:, None], result)
     rest = data.some(held)
-    nominal = nominal_parameters(data.voltages.shape[1])
-    after = heading_errors(rest, np.where(_left(trained) < UNTOLD, trained.parameters, nominal), trained.earth)
-    before = heading_errors(rest, nominal, 1.0)
+    calibrated = told(trained)
+    after = heading_errors(rest, calibrated.parameters, calibrated.earth)
+    before = heading_errors(rest, nominal_parameters(data.voltages.shape[1]), 1.0)
     both = np.isfinite(before) & np.isfinite(after)
-    return before[both], after[both]
+    return trained, before[both], after[both]
 
 
-def _left(result: Fit) -> np.ndarray:
+def told(result: Fit) -> Fit:
+    """A fit in which parameters that the recording says nothing of are as the mission has them.
+
+    The others are then what it tells of them beside such ones: what it told of them together with values that are not
+    kept would be wrong by what those had taken on, as scales are too small beside a dark level of an unpredicted Earth.
+    """
+    left, free = left_of(result), result.unknowns.free
+    dropped = np.zeros(len(result.x), np.bool_)
+    dropped[: int(free.sum())] = left[free] >= UNTOLD
+    of_dropped = result.covariance[:, dropped]
+    x = result.x - of_dropped @ np.linalg.solve(of_dropped[dropped], result.x[dropped])
+    return replace(result, x=np.where(dropped, 0.0, x))
+
+
+def left_of(result: Fit) -> np.ndarray:
     """(N, 5) what is left of the ignorance of each parameter; 1 where nothing was looked for."""
     unknowns = result.unknowns
     left = np.ones(unknowns.free.shape)

@@ -164,7 +164,7 @@ def calibration_file(c: Calibration, source: str, extends: str | None) -> str:
             matrix[i, j] = matrix[j, i] = rows[f"soft_iron_{pair}"].value
         shared["magnetometer.measured.matrix"] = _rounded(matrix.ravel(), 7)
     begin, end = (format_utc(int(c.recorded.stamp_ns[k])) for k in (0, -1))
-    left_alone, together = _not_told(c)
+    left_alone, together = not_told(c)
     head = [
         f"Calibration of {c.recorded.mission.name} by {source}, {begin} to {end}.",
         f"Reference: {c.reference}; response of the cells: {c.curve}. Scales hold at {c.reference_temperature:g} deg C."
@@ -176,7 +176,7 @@ def calibration_file(c: Calibration, source: str, extends: str | None) -> str:
     return "".join(f"# {line}\n" for line in head) + dump_sections({"/**": shared})
 
 
-def _not_told(c: Calibration) -> tuple[list[Row], list[Row]]:
+def not_told(c: Calibration) -> tuple[list[Row], list[Row]]:
     """Rows that are not observable: those left as they were, and those whose value is in the file all the same."""
     column = {name: k for name, k, _, _ in _CELL_ROWS}
     rows = [row for row in rows_of(c) if not row.observable]

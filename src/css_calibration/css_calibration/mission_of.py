@@ -14,13 +14,22 @@ def recorded_by(options: argparse.Namespace) -> Recorded:
     Raises:
         MissionError, BagError, CalibrationError: as `read_recorded`.
     """
-    remap = dict(_remapping(item) for item in options.remap)
+    remap = remapping(options)
     mission = load_mission(options.mission, options.overrides) if options.mission is not None else None
     recorded = read_recorded(options.bag, mission, remap)
     if options.mission is None and options.overrides:
         changed = recorded.mission.with_overrides(options.overrides)
         recorded = read_recorded(options.bag, changed, remap)
     return recorded
+
+
+def remapping(options: argparse.Namespace) -> dict[str, str]:
+    """New names of the recording's topics.
+
+    Raises:
+        MissionError: the option has another form.
+    """
+    return dict(_remapping(item) for item in options.remap)
 
 
 def _remapping(text: str) -> tuple[str, str]:

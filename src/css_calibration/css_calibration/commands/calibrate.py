@@ -3,7 +3,8 @@
 
 Batch least squares over all of it. Of each cell scale, dark level, two tilts of its normal and, with a temperature, its
 coefficient; of the magnetometer bias, scale and soft iron; of the gyro its bias: each with its standard deviation, and
-what the recording cannot tell named and left as it is. The outputs at the end are held out and show what it is worth.
+what the recording cannot tell named and left as it is. The outputs at the end are held out and show what it is worth:
+to the cells of one instant, and to each Sun estimator that the recording can feed.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,8 @@ _EXAMPLES = (
 )
 _EXITS = {
     0: "calibrated, and the heading of the part that was held out errs by less",
-    1: "calibrated, but the heading there errs by no less, or no cell was told more than its dark level",
+    1: "calibrated, but the heading there errs by no less, that of an estimator errs by more than before, beyond the "
+    "interval of the comparison, or no cell was told more than its dark level",
     2: "the recording has nothing to hold the cells against, or what is asked for is wrong",
 }
 _NOTES = """\

@@ -21,6 +21,7 @@ from css_calibration.calibration_result import (
 )
 from css_calibration.cell_fit_model import GAIN, TILT_1, TILT_2
 from css_calibration.errors import CalibrationError
+from css_calibration.estimator_gain import CONFIDENCE, Gain, Gains, gain_object, gains_of, worse_lines
 from css_calibration.mission_of import recorded_by
 from css_calibration.step_lines import step_lines
 from css_common.command import FAILED, complain
@@ -49,18 +50,21 @@ def run(prog: str, options: argparse.Namespace) -> int:
     assert options.response == "auto" or options.response in CURVES
     with still_working(f"calibrating by {options.bag}"):
         recorded = recorded_by(options)
+        tell = step_lines()
         result = calibrate(
-            recorded, reference=options.reference, curve=options.response, holdout=options.holdout, tell=step_lines()
+            recorded, reference=options.reference, curve=options.response, holdout=options.holdout, tell=tell
         )
+        worth = gains_of(result, options, tell)
     text = calibration_file(result, str(options.bag), options.extends)
     write_whole(file, text)
-    _print(result, Console(highlight=False, markup=False))
+    _print(result, worth, Console(highlight=False, markup=False))
     print(f"calibration: {file}")
     if options.json:
-        print(json.dumps(result_object(result, str(options.bag), str(file)), allow_nan=False))
-    wrong = _shortcoming(result)
-    if wrong:
-        complain(prog, wrong, "not as it should be")
+        found = result_object(result, str(options.bag), str(file)) | gain_object(worth)
+        print(json.dumps(found, allow_nan=False))
+    wrong = [line for line in (_shortcoming(result), *worse_lines(result, worth.gains)) if line]
+    for line in wrong:
+        complain(prog, line, "not as it should be")
     return FAILED if wrong else 0
 
 
@@ -79,7 +83,7 @@ def _shortcoming(result: Calibration) -> str:
     return ""
 
 
-def _print(result: Calibration, console: Console) -> None:
+def _print(result: Calibration, worth: Gains, console: Console) -> None:
     rows = rows_of(result)
     console.print(_cell_table(result, rows))
     others = [row for row in rows if row.cell is None]
@@ -102,7 +106,7 @@ def _print(result: Calibration, console: Console) -> None:
         )
     for line in unobserved_combinations(result):
         console.print(f"not told: {line}", soft_wrap=True)
-    for line in result.notes:
+    for line in (*result.notes, *worth.notes):
         console.print(f"noted: {line}", soft_wrap=True)
     before, after = mean_deg(result.before), mean_deg(result.after)
     if before is None or after is None:
@@ -111,6 +115,24 @@ def _print(result: Calibration, console: Console) -> None:
         console.print(
             f"heading by cells alone, {len(result.before)} instants held out: {before:.3f} deg, {after:.3f} calibrated"
         )
+    if worth.gains:
+        console.print(_gain_table(worth.gains))
+
+
+def _gain_table(gains: list[Gain]) -> ReadableTable:
+    """Heading errors of each estimator before and after."""
+    table = ReadableTable(f"mean heading error of the part that was held out, interval of {100.0 * CONFIDENCE:.0f} %")
+    table.add_name("estimator")
+    for heading in ("before\n[deg]", "calibrated\n[deg]", "change\n[deg]", "interval\n[deg]", "instants"):
+        table.add_number(heading)
+    table.add_name("leaves out\nmore cells")
+    for gain in gains:
+        interval = "-" if gain.interval_deg is None else f"{gain.interval_deg:.3f}"
+        angles = [f"{x:.3f}" for x in (gain.before_deg, gain.after_deg)]
+        change = f"{gain.after_deg - gain.before_deg:+.3f}"
+        cells = ", ".join(str(cell.cell) for cell in gain.left_out)
+        table.add_texts([gain.estimator, *angles, change, interval, f"{gain.instants}", cells])
+    return table
 
 
 def _cell_table(result: Calibration, rows: list[Row]) -> ReadableTable:
