@@ -20,8 +20,7 @@ _EXAMPLES = (
 )
 _EXITS = {
     0: "calibrated, and the heading of the part that was held out errs by less",
-    1: "calibrated, but the heading there errs by no less, that of an estimator errs by more than before, beyond the "
-    "interval of the comparison, or no cell was told more than its dark level",
+    1: "calibrated, but the heading there errs by no less, an estimator's by more, or dark levels alone were told",
     2: "the recording has nothing to hold the cells against, or what is asked for is wrong",
 }
 _NOTES = """\
