@@ -186,7 +186,6 @@ def test_what_it_finds_of_a_bag_is_taken_by_replay(flights, tmp_path, capsys):
     assert "--overwrite replaces it" in capsys.readouterr().err
 
 
-@pytest.mark.long
 def test_an_estimator_that_is_worse_with_a_calibration_is_said(tmp_path, capsys):
     """An average of normals is worse off with tilts that it knows; least squares on the same cells is not."""
     flight = flown(mission_of("mission.case=3", "css_array.degradation=0.0", *six_faces()))
