@@ -99,7 +99,7 @@ def read_cells(
 
     Args:
         flux: of the Sun [-], 1 at 1 AU.
-        more_noise: variance of each cell [-] beside that of its noise.
+        more_noise: variance of each cell [-] beside that of its noise; where the Earth is known, in units of its light.
         earth_known: `light` is that of the Earth; else it is unknown.
         learns: the states of calibration are corrected.
         states: how many of the states are in use.
@@ -136,7 +136,8 @@ def read_cells(
         innovation = v - mean - share * along(c, earth_known, correction)
         for j in range(states):
             gained[j] = share * along(c, earth_known, covariance[j])
-        variance = noise + more_noise + share * share * c.spread + share * along(c, earth_known, gained)
+        more = more_noise * m.earth[i] * m.earth[i] if earth_known else more_noise
+        variance = noise + more + share * share * c.spread + share * along(c, earth_known, gained)
         squared = innovation * innovation / variance
         likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(variance))
         if squared > p.convergence.gate and sigma < _CONVERGED:

@@ -36,11 +36,26 @@ def part_of_expected(p: SunFilterParameters, x, sun_n: Vec3, flux: float, voltag
 
 
 @kernel
+def lit_elsewhere(p: SunFilterParameters, x, sun_n: Vec3, flux: float, voltages) -> bool:
+    """Whether a cell that the estimate has in the dark is brighter than an Earth makes it."""
+    sun_b = multiply(dcm_of(x), sun_n)
+    for i in range(voltages.shape[0]):
+        _, seen, doubtful = view_of(p, i, sun_b, _MARGIN)
+        cell = p.cells[i]
+        if not seen and not doubtful and p.earth.largest * flux < (voltages[i] - cell.dark) / cell.gain < READABLE:
+            return True
+    return False
+
+
+@kernel
 def fading(p: SunFilterParameters, x, covariance, sun_n: Vec3, flux: float, voltages, faded: float, dt: float) -> float:
     """How long [s] outputs have been too low, 0 while they are as expected.
 
-    What lasts is taken for another intensity, of which the filter then learns.
+    What lasts is taken for another intensity, of which the filter then learns. Where another cell is lit nothing fades:
+    the Sun is there.
     """
+    if lit_elsewhere(p, x, sun_n, flux, voltages):
+        return 0.0
     part = part_of_expected(p, x, sun_n, flux, voltages)
     if part > (_RISEN if faded > 0.0 else _FADED):
         return 0.0

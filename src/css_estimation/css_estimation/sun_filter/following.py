@@ -19,7 +19,7 @@ from css_estimation.sun_filter.filter_state import (
     SunFilterState,
     filtered_rate,
 )
-from css_estimation.sun_filter.hypotheses import give_up, loosen, the_only_one, weigh
+from css_estimation.sun_filter.hypotheses import SETTLING, give_up, loosen, the_only_one, weigh
 from css_estimation.sun_filter.memory import (
     DEAD,
     EARTH,
@@ -55,8 +55,8 @@ def _forget_slowly(
 
 @kernel
 def _start_noise(since: float) -> float:
-    """Variance of outputs [-] by what a linear filter makes of large corrections, which come first [s]."""
-    return (_FIRST_NOISE * math.exp(-since / _FIRST_TIME)) ** 2
+    """Variance by what a linear filter makes of large corrections, which come first [s], in units of the largest."""
+    return math.exp(-2.0 * since / _FIRST_TIME)
 
 
 @kernel
@@ -85,9 +85,9 @@ def track_cycle(
         if k == 0 or memory.weights[k] > memory.weights[best]:
             best, raw_b = k, omega_b
     best_x, best_covariance = memory.estimates[best], memory.covariances[best]
-    # while turns are looked for outputs are not as expected; a model of the orbit may be late by as much as a place
-    # errs
-    settled = not earth_known or the_only_one(memory) == best
+    # when turns begin to be looked for outputs are not as expected; a model of the orbit may be late by as much as a
+    # place errs
+    settled = not earth_known or the_only_one(memory) == best or before.since > SETTLING
     if not use:
         # light that comes back has to be whole again
         faded = max(faded, dt)
@@ -95,7 +95,10 @@ def track_cycle(
         faded = fading(p, best_x, best_covariance, sun_n, cycle.flux, voltages, faded, dt)
         use = faded == 0.0
     if use:
-        more_noise = 0.0 if earth_known else p.earth.unknown**2 + _start_noise(before.since)
+        # each turn begins with the heading that an unknown Earth left, and has the Earth's light where that puts it
+        more_noise = _start_noise(before.since)
+        if not earth_known:
+            more_noise = p.earth.unknown**2 + _FIRST_NOISE**2 * more_noise
         for k in range(HYPOTHESES):
             if memory.weights[k] <= DEAD:
                 continue

@@ -43,11 +43,11 @@ _NO_CLOUDS = 8.0
 _NO_CLOUD = 4.0**2
 # Errors of a new hypothesis [rad2]: about the Sun line, and across it what the unknown Earth may have done.
 _ROLL_VARIANCE = 0.2**2
-_HEADING_VARIANCE = 0.05**2
+_HEADING_VARIANCE = 0.1**2
 _SEARCH_VARIANCE = 0.1**2
 # Large errors about the Sun line are corrected step by step, each of which a linear filter takes for final: the
 # variance is kept above one that falls within this time [s] ...
-_SETTLING = 60.0
+SETTLING = 60.0
 # ... and both go on to grow, by what clouds do that last, and what a wrong turn made of the Earth's light [rad2/s].
 _ROLL_NOISE, _HEADING_NOISE = 1e-5, 1e-7
 
@@ -140,6 +140,22 @@ def earth_is_elsewhere(p: SunFilterParameters, x) -> bool:
 
 
 @kernel
+def none_is_credible(p: SunFilterParameters, m: SunFilterMemory) -> bool:
+    """Whether the clouds of all hypotheses are none; else those of which they are none are given up.
+
+    Their weights do not tell: clouds that have been taken in explain the outputs, however bright they are.
+    """
+    credible = False
+    for k in range(HYPOTHESES):
+        if m.weights[k] > DEAD and not earth_is_elsewhere(p, m.estimates[k]):
+            credible = True
+    for k in range(HYPOTHESES):
+        if credible and m.weights[k] > DEAD and earth_is_elsewhere(p, m.estimates[k]):
+            m.weights[k] = DEAD
+    return not credible
+
+
+@kernel
 def look_again(p: SunFilterParameters, m: SunFilterMemory, best: int, sun_n: Vec3) -> None:
     """Looks for the turn anew, from the attitude of a hypothesis; what it has learnt of the cells is in doubt."""
     if best != 0:
@@ -175,7 +191,7 @@ def _widen_across(covariance, axis_n: Vec3, variance: float) -> None:
 @kernel
 def loosen(covariance, sun_n: Vec3, since: float, dt: float) -> None:
     """Keeps the variance about the Sun line above what is credible `since` [s] the hypotheses began; clouds' noise."""
-    left = math.exp(-2.0 * since / _SETTLING)
+    left = math.exp(-2.0 * since / SETTLING)
     about = quadratic(covariance, THETA, sun_n)
     _widen(covariance, sun_n, max(_ROLL_NOISE * dt, _ROLL_VARIANCE * left - about))
     _widen_across(covariance, sun_n, _HEADING_NOISE * dt)
