@@ -93,7 +93,7 @@ VARIANTS = {
         ["mission.case=3", "measures.settled_time=60", "earthlight.albedo.factor=1.1"]
     ),
     "by the light of the Earth, without gyro": lambda: load_mission("okeefe_earthlight").with_overrides(
-        ["mission.case=9", "measures.settled_time=60", "earthlight.use_gyro=false"]
+        ["mission.case=12", "measures.settled_time=60", "earthlight.use_gyro=false"]
     ),
 }
 
