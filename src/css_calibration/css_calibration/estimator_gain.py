@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy import stats
 
+from css_analysis.flight_log import angle
 from css_analysis.health_record import HealthRecord, health_records
 from css_bringup.estimator_request import EstimatorRequest
 from css_bringup.replay_pass import Replay
@@ -155,12 +156,8 @@ def _run(c: Calibration, lit: np.ndarray, name: str, options: argparse.Namespace
         rows = np.clip(np.searchsorted(estimates.stamp_ns, wanted), 0, len(estimates) - 1)
         there = (estimates.stamp_ns[rows] == wanted) & (estimates.validity[rows] != SunEstimate.VALIDITY_NONE)
         isolated[there] = estimates.isolated[rows][there]
-        errors[there] = _angles(estimates.sun_b[rows][there], sun_b[there])
+        errors[there] = angle(estimates.sun_b[rows][there], sun_b[there])
     return _Run(errors, isolated, records)
-
-
-def _angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.sum(a * b, axis=1))
 
 
 def _gain(name: str, before: _Run, after: _Run) -> Gain | None:

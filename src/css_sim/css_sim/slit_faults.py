@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from css_common.case_faults import CaseFault, CaseFaults
-from css_common.fault_lines import FAULTS, Units
+from css_common.fault_lines import Units
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values
 from css_common.sections import PERIOD
@@ -45,11 +45,6 @@ def units(values: Values) -> Units:
 def of_case(values: Values, key: RandomKey) -> CaseFaults:
     """The faults of one case, by the lines that there are."""
     return faults.of_case(KINDS, units(values), key, values[PERIOD])
-
-
-def case_faults(values: Values, key: RandomKey) -> list[CaseFault]:
-    """Faults of one case."""
-    return of_case(values, key).of(values[FAULTS])
 
 
 class FaultyHeads:
