@@ -108,6 +108,13 @@ class SunFilterFlight:
         """Error of a heading."""
         return float(np.degrees(angle_between(heading.sun_b, self.sun_b)))
 
+    def squared_error(self, heading):
+        """The error normalised by its covariance, squared: chi-square of the two axes across the Sun line."""
+        error = np.subtract(heading.sun_b, self.sun_b)
+        across = np.linalg.svd(np.array([self.sun_b]))[2][1:]
+        covariance = across @ np.reshape(heading.covariance, (3, 3)) @ across.T
+        return float(across @ error @ np.linalg.solve(covariance, across @ error))
+
 
 def _transposed(m):
     return tuple(zip(*m, strict=True))

@@ -256,10 +256,7 @@ def test_errors_are_as_large_as_the_filter_says(gyro):
             heading = flight.step(gyro=gyro)
             innovations += heading.nis
             freedom += heading.nis_dof
-        error = np.subtract(heading.sun_b, flight.sun_b)
-        across = np.linalg.svd(np.array([flight.sun_b]))[2][1:]
-        covariance = across @ np.reshape(heading.covariance, (3, 3)) @ across.T
-        squared.append(across @ error @ np.linalg.solve(covariance, across @ error))
+        squared.append(flight.squared_error(heading))
     # 99.9 % of the mean of 40 chi-square numbers of two degrees of freedom
     assert 1.1 < np.mean(squared) < 3.2
     assert 0.9 < innovations / freedom < 1.1

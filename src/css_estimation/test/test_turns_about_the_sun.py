@@ -10,7 +10,7 @@ from sun_filter_flight import SunFilterFlight
 
 from css_common.vectors import unit
 from css_environment.albedo import albedo_output, new_workspace
-from css_estimation.sun_filter.hypotheses import none_is_credible
+from css_estimation.sun_filter.hypotheses import give_up_elsewhere
 from css_estimation.sun_filter.memory import DEAD, X_GAIN
 
 CELLS = 6
@@ -32,13 +32,6 @@ class UnderClouds(SunFilterFlight):
         albedo_output(self.light, p.cells, p.screen, p.cos_half_view, self.dcm_bn, new_workspace(), light)
         outputs += self.more * light
 
-    def nees(self, heading) -> float:
-        """Of each axis across the Sun line."""
-        error = np.subtract(heading.sun_b, self.sun_b)
-        across = np.linalg.svd(np.array([self.sun_b]))[2][1:]
-        covariance = across @ np.reshape(heading.covariance, (3, 3)) @ across.T
-        return 0.5 * float(across @ error @ np.linalg.solve(covariance, across @ error))
-
 
 def test_few_headings_beside_bright_faces_are_beyond_three_error_bars():
     """Not none: the Sun low over one face and the Earth on the opposite one may be taken for each other."""
@@ -46,7 +39,7 @@ def test_few_headings_beside_bright_faces_are_beyond_three_error_bars():
     for seed in range(24):
         flight = UnderClouds(seed)
         for _ in range(15):
-            found.append(flight.nees(flight.fly(10.0, gyro=True, change=flight.clouds)))
+            found.append(0.5 * flight.squared_error(flight.fly(10.0, gyro=True, change=flight.clouds)))
     assert 0.5 < np.median(found) < 1.5
     assert np.mean(np.array(found) > 3.0**2) < 0.05
 
@@ -67,14 +60,14 @@ def followed():
 def test_a_turn_whose_clouds_are_none_is_given_up_for_another_however_likely_it_is(followed):
     flight, clouds = followed
     clouds[2, 3] = 4.1
-    assert not none_is_credible(flight.p, flight.memory)
+    assert not give_up_elsewhere(flight.p, flight.memory)
     assert np.flatnonzero(flight.memory.weights > DEAD).tolist() == [5, 7]
-    assert not none_is_credible(flight.p, flight.memory)
+    assert not give_up_elsewhere(flight.p, flight.memory)
     assert np.flatnonzero(flight.memory.weights > DEAD).tolist() == [5, 7]
 
 
 def test_where_all_clouds_are_none_all_turns_are_kept_to_be_looked_for_again(followed):
     flight, clouds = followed
     clouds[[2, 5, 7], 3] = 4.1, -4.1, 9.0
-    assert none_is_credible(flight.p, flight.memory)
+    assert give_up_elsewhere(flight.p, flight.memory)
     assert np.flatnonzero(flight.memory.weights > DEAD).tolist() == [2, 5, 7]

@@ -45,6 +45,8 @@ LEFT_OUT, COUNTED, USED = 0, 1, 2
 
 # A step in the output smaller than this is none.
 _SMALLEST_STEP = 0.05
+# A cell that gives less of the light tells nothing of it.
+_LEAST_GAIN = 0.2
 # Below so many standard deviations of noise a cell that does not see the Sun is dark and says nothing. What is expected
 # decides that: the reading would keep the high ones of a dim cell alone. One so much higher cannot be noise.
 _DARK, _SURELY_LIT = 3.0, 4.0
@@ -104,6 +106,13 @@ def view_of(p: SunFilterParameters, i: int, sun_b: Vec3, margin: float) -> tuple
         elif above < 0.0:
             doubtful = False
     return cosine, seen, doubtful
+
+
+@kernel
+def light_of(p: SunFilterParameters, i: int, voltage: float) -> float:
+    """Light [-] on cell i by an output, 1 that of the Sun at normal incidence."""
+    cell = p.cells[i]
+    return (voltage - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
 
 
 @kernel

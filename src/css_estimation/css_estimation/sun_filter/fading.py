@@ -3,7 +3,7 @@
 
 from css_common.kernel import kernel
 from css_common.vectors import Vec3, multiply
-from css_estimation.sun_filter.cell_model import view_of
+from css_estimation.sun_filter.cell_model import light_of, view_of
 from css_estimation.sun_filter.cell_update import READABLE
 from css_estimation.sun_filter.memory import SCALE, X_SCALE, dcm_of, forget
 from css_estimation.sun_filter.options import SunFilterParameters
@@ -21,41 +21,33 @@ _OTHER_SCALE = 0.3**2
 
 @kernel
 def part_of_expected(p: SunFilterParameters, x, sun_n: Vec3, flux: float, voltages) -> float:
-    """Outputs of the cells that see the Sun, by least squares relative to what is expected of them; 1 without any."""
+    """Outputs of the cells that see the Sun, by least squares relative to what is expected of them.
+
+    1 without any, and where a cell that does not see it is brighter than an Earth makes it: there is the Sun.
+    """
     sun_b = multiply(dcm_of(x), sun_n)
     both = squares = 0.0
     for i in range(voltages.shape[0]):
         cosine, seen, doubtful = view_of(p, i, sun_b, _MARGIN)
-        if seen and not doubtful and abs(voltages[i]) < READABLE:
+        if doubtful or not abs(voltages[i]) < READABLE:
+            continue
+        if seen:
             cell = p.cells[i]
             output, _ = respond(p.response, flux * max(cosine, 0.0))
             expected = cell.gain * p.response.scale * (1.0 + x[X_SCALE]) * output
             both += expected * (voltages[i] - cell.dark)
             squares += expected * expected
+        elif light_of(p, i, voltages[i]) > p.earth.largest * flux:
+            return 1.0
     return both / squares if squares > 0.0 else 1.0
-
-
-@kernel
-def lit_elsewhere(p: SunFilterParameters, x, sun_n: Vec3, flux: float, voltages) -> bool:
-    """Whether a cell that the estimate has in the dark is brighter than an Earth makes it."""
-    sun_b = multiply(dcm_of(x), sun_n)
-    for i in range(voltages.shape[0]):
-        _, seen, doubtful = view_of(p, i, sun_b, _MARGIN)
-        cell = p.cells[i]
-        if not seen and not doubtful and p.earth.largest * flux < (voltages[i] - cell.dark) / cell.gain < READABLE:
-            return True
-    return False
 
 
 @kernel
 def fading(p: SunFilterParameters, x, covariance, sun_n: Vec3, flux: float, voltages, faded: float, dt: float) -> float:
     """How long [s] outputs have been too low, 0 while they are as expected.
 
-    What lasts is taken for another intensity, of which the filter then learns. Where another cell is lit nothing fades:
-    the Sun is there.
+    What lasts is taken for another intensity, of which the filter then learns.
     """
-    if lit_elsewhere(p, x, sun_n, flux, voltages):
-        return 0.0
     part = part_of_expected(p, x, sun_n, flux, voltages)
     if part > (_RISEN if faded > 0.0 else _FADED):
         return 0.0

@@ -140,19 +140,22 @@ def earth_is_elsewhere(p: SunFilterParameters, x) -> bool:
 
 
 @kernel
-def none_is_credible(p: SunFilterParameters, m: SunFilterMemory) -> bool:
-    """Whether the clouds of all hypotheses are none; else those of which they are none are given up.
+def give_up_elsewhere(p: SunFilterParameters, m: SunFilterMemory) -> bool:
+    """Gives up hypotheses whose clouds are none, but not the last ones; whether those of all are none.
 
-    Their weights do not tell: clouds that have been taken in explain the outputs, however bright they are.
+    Weights do not tell: clouds that have been taken in explain the outputs, however bright they are.
     """
-    credible = False
+    followed, elsewhere = 0, 0
     for k in range(HYPOTHESES):
-        if m.weights[k] > DEAD and not earth_is_elsewhere(p, m.estimates[k]):
-            credible = True
+        if m.weights[k] > DEAD:
+            followed += 1
+            elsewhere += 1 if earth_is_elsewhere(p, m.estimates[k]) else 0
+    if elsewhere == 0 or elsewhere == followed:
+        return elsewhere > 0
     for k in range(HYPOTHESES):
-        if credible and m.weights[k] > DEAD and earth_is_elsewhere(p, m.estimates[k]):
+        if m.weights[k] > DEAD and earth_is_elsewhere(p, m.estimates[k]):
             m.weights[k] = DEAD
-    return not credible
+    return False
 
 
 @kernel

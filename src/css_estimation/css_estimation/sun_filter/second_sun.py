@@ -18,6 +18,7 @@ from css_estimation.sun.fading import light_on
 from css_estimation.sun.left_open import surely_spans_space
 from css_estimation.sun.other_sun import Followed, OtherSun, follow_other, no_other_sun, with_other
 from css_estimation.sun.sun_heading import Aiding, Covariance
+from css_estimation.sun_filter.cell_model import light_of
 from css_estimation.sun_filter.cell_update import CellReading, bit_count
 from css_estimation.sun_filter.filter_state import NO_RATE, Cycle, SunFilterState
 from css_estimation.sun_filter.hypotheses import begin
@@ -28,7 +29,6 @@ from css_estimation.sun_filter.reported import LARGEST
 from css_estimation.sun_filter.reported import heading as heading_of
 from css_estimation.symmetric import at_most, of_row_major, scaled, trace
 
-_LEAST_GAIN = 0.2
 _LEAST_LIGHT = 0.5
 # [rad2/s] How fast the other Sun drifts where a gyro tells how the body turns, and where its own motion would have to.
 _DRIFT, _DRIFT_WITHOUT_RATE = 0.01**2, 0.1**2
@@ -47,9 +47,7 @@ class Beside(NamedTuple):
 def _write_sunlight(p: SunFilterParameters, voltages, sunlight) -> None:
     """Outputs less the mean light of an unknown Earth, 1 being the Sun at normal incidence."""
     for i in range(voltages.shape[0]):
-        cell = p.cells[i]
-        light = (voltages[i] - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
-        sunlight[i] = light - 0.5 * p.earth.unknown
+        sunlight[i] = light_of(p, i, voltages[i]) - 0.5 * p.earth.unknown
 
 
 @kernel

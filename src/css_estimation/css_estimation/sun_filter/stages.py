@@ -18,7 +18,7 @@ from css_estimation.sun_filter.filter_state import (
     Cycle,
     Progress,
 )
-from css_estimation.sun_filter.hypotheses import SETTLING, look_again, look_for_roll, none_is_credible
+from css_estimation.sun_filter.hypotheses import SETTLING, give_up_elsewhere, look_again, look_for_roll
 from css_estimation.sun_filter.memory import SunFilterMemory, dcm_of
 from css_estimation.sun_filter.options import SunFilterParameters
 from css_estimation.sun_filter.sun_search import cost, least_cost
@@ -90,7 +90,7 @@ def progress_after(
     if use and aiding.sky.known and converged:
         look_for_roll(p, memory, sun_n)
         stage, since = STAGE_ROLL, 0.0
-    elif stage == STAGE_ROLL and none_is_credible(p, memory) and (left == 1 or since > SETTLING):
+    elif stage == STAGE_ROLL and give_up_elsewhere(p, memory) and (left == 1 or since > SETTLING):
         look_again(p, memory, best, sun_n)
         since = 0.0
     return Progress(stage, True, since, contrary, faded), mode

@@ -15,7 +15,7 @@ import math
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, multiply
 from css_estimation.sun.direction_grid import direction, mean_direction
-from css_estimation.sun_filter.cell_model import view_of
+from css_estimation.sun_filter.cell_model import light_of, view_of
 from css_estimation.sun_filter.cell_update import READABLE
 from css_estimation.sun_filter.memory import DIRECTIONS
 from css_estimation.sun_filter.options import SunFilterParameters
@@ -26,7 +26,6 @@ _MARGIN = 0.07  # in cosines, half of the way from one direction to the next
 _TURN = 2.0 * _MARGIN  # [rad] after which a look is another one
 _SIGMA = 0.1  # error of an output that model and Earth leave
 _MOST = 12.0  # cost of a single cell, so that a broken one does not decide
-_LEAST_GAIN = 0.2
 
 
 @kernel
@@ -38,10 +37,9 @@ def cost(p: SunFilterParameters, voltages, flux: float, sun_b: Vec3) -> float:
         if not abs(voltages[i]) < READABLE:
             continue
         cosine, seen, doubtful = view_of(p, i, sun_b, _MARGIN)
-        cell = p.cells[i]
-        v = (voltages[i] - cell.dark) / max(_LEAST_GAIN, cell.gain * p.response.scale)
-        dark = (v - mean_albedo) / _SIGMA
-        lit = (v - mean_albedo - flux * max(cosine, 0.0)) / _SIGMA
+        light = light_of(p, i, voltages[i])
+        dark = (light - mean_albedo) / _SIGMA
+        lit = (light - mean_albedo - flux * max(cosine, 0.0)) / _SIGMA
         worst = lit * lit if seen else dark * dark
         if doubtful:
             worst = min(lit * lit, dark * dark)
