@@ -6,14 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import fly_composed, messages_by_topic, samples
-from rclpy.node import Node
+from flights import fly_composed, messages_by_topic, operator_of, samples
+from rclpy.client import Client
 from test_faults_in_flight import CASE, mission_with, trace_of
 
 from css_analysis.faults_flown import faults_flown
 from css_analysis.flight_log import read_flight
 from css_bringup.composed import ComposedFlight
-from css_common.executor import retire
 from css_common.fault_lines import parse_line
 from css_common.mission import Mission
 from css_monte_carlo.chunk import fly_cases
@@ -44,24 +43,21 @@ OF_LINKS = [
 
 def fly_with_requests(mission: Mission, bag: Path, asked: list[tuple]) -> list[str]:
     """Flies a mission with an operator who injects faults; the lines that the nodes answer."""
+    waiting, answers = list(asked), []
+    clients: dict[str, Client] = {}
     with ComposedFlight(mission, bag) as flight:
-        operator = Node("operator", context=flight.context, use_global_arguments=False)
-        flight.executor.add_node(operator)
-        clients = {
-            node: operator.create_client(InjectFault, f"{node}/inject_fault") for node in {row[1] for row in asked}
-        }
-        waiting, answers = list(asked), []
 
-        def ask() -> bool:
+        def ask() -> None:
             elapsed = (flight.plant.stamp_ns - mission.epoch_ns) / 1e9
-            if flight.plant.begun and waiting and elapsed >= waiting[0][0]:
+            while waiting and elapsed >= waiting[0][0]:
                 _, node, target, kind, values, duration = waiting.pop(0)
                 request = InjectFault.Request(target=target, kind=kind, values=values, duration=duration)
                 answers.append(clients[node].call_async(request))
-            return False
 
-        result = flight.fly(stopped=ask)
-        retire(flight.executor, operator)
+        with operator_of(flight, ask) as operator:
+            for _, node, *_ in asked:
+                clients[node] = operator.create_client(InjectFault, f"{node}/inject_fault")
+            result = flight.fly()
         assert result.failure == "" and not waiting
     given = [answer.result() for answer in answers]
     assert all(answer.success for answer in given), [answer.message for answer in given]

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from flights import messages_by_topic, samples
+from flights import messages_by_topic, operator_of, samples
 from rclpy.parameter import Parameter
 from test_faults_in_flight import CASE, mission_with, trace_of
 
@@ -67,15 +67,15 @@ def test_a_parameter_set_in_flight_acts_from_the_next_cycle_on(tmp_path):
     with ComposedFlight(mission, tmp_path / "bag") as flight:
         done: list[int] = []
 
-        def change() -> bool:
+        def change() -> None:
             if not done and flight.plant.stamp_ns >= mission.epoch_ns + 10**9:
                 done.append(flight.plant.stamp_ns)
                 for node, name, value in SET.values():
                     (result,) = flight.nodes[node].set_parameters([Parameter(name, value=value)])
                     assert result.successful
-            return False
 
-        flight.fly(stopped=change)
+        with operator_of(flight, change):
+            flight.fly()
     assert done
     gyro = samples(tmp_path / "bag", "/gyro/imu", mission.topics["gyro/imu"])
     variances = [s.angular_velocity_covariance[0] for s in gyro]
