@@ -24,7 +24,7 @@ from css_monte_carlo.chunk import fly_cases
 from css_monte_carlo.mission_flight import MissionFlight
 
 _DRAWS = 20_000
-CARRIED = ((erfa, "epv00"), (erfa, "c2t06a"), (np.linalg, "pinv"))
+CARRIED = ((erfa, "epv00"), (erfa, "c2t06a"))
 """Functions of other compiled libraries that a flight calls before it begins, and that round as they were compiled."""
 
 

@@ -19,6 +19,8 @@ from bootstrap.project import Project, State
 from bootstrap.verbs import VERBS
 from bootstrap.work import Work
 
+# What libraries choose their arithmetic by, and with it the last bits of results.
+_ARITHMETIC = ("OPENBLAS_", "NPY_", "OMP_", "NUMBA_")
 # What the wheels of ROS bring. `site-packages` of the tests holds them all, message packages too: those that are laid
 # out come first, and of the others nothing may be taken.
 ROS = re.compile("rcl.*|rosidl.*|ament.*|rpyutils|rmw.*|launch.*|ros2.*|osrf.*|.*_msgs|.*_interfaces")
@@ -88,7 +90,8 @@ def _environment(work: Work) -> dict[str, str]:
         if entry.is_symlink():
             # taken from where the tests have them, so that what is compiled is compiled once
             entry.unlink()
-    kept = {name: os.environ[name] for name in ("PATH", "HOME", "SUNPOINT_HOME", "PYTHONPYCACHEPREFIX", "MPLBACKEND")}
+    names = ("PATH", "HOME", "SUNPOINT_HOME", "PYTHONPYCACHEPREFIX", "MPLBACKEND")
+    kept = {name: value for name, value in os.environ.items() if name in names or name.startswith(_ARITHMETIC)}
     sources = [path for path in os.environ["PYTHONPATH"].split(os.pathsep) if str(ROOT) in path]
     return {
         **kept,

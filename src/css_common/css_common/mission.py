@@ -10,23 +10,23 @@ nobody declares, so each reader checks the whole file here first and a typo dies
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from css_common import dispersions
-from css_common.codec import type_name
-from css_common.component import Component, Input, Output, Plant, all_conflicts, missing_values
+from css_common.component import Component, Output, Plant, all_conflicts, missing_values
 from css_common.dispersions import Dispersion, dispersions_of, text_parameter
 from css_common.epochs import mission_epoch
 from css_common.fault_lines import FAULTS, SECTION, Host, entries_of, entry_parameter
-from css_common.link_kinds import KINDS as LINK_KINDS
 from css_common.link_kinds import LINK_FAULTS, of_sorts, parameter_of
 from css_common.mission_extends import sections_of_file, sections_of_text
 from css_common.mission_file import MissionError, dump_sections
 from css_common.mission_lookup import find_mission
+from css_common.mission_node import Node, check_wiring
 from css_common.mission_script import Event, criteria_of, events_of
+from css_common.mission_section import EPOCH
 from css_common.node_files import find_component, parse_node_entry
 from css_common.parameter_sections import (
     SHARED,
@@ -43,7 +43,6 @@ from css_common.schema import (
     Parameter,
     ParameterError,
     Table,
-    Values,
     checked_values,
     flag,
     missing,
@@ -51,7 +50,6 @@ from css_common.schema import (
     shown,
     unknown_name,
 )
-from css_common.sections import EPOCH
 from css_common.shared_sections import conflicts, shared_parameters
 
 __all__ = [
@@ -59,7 +57,6 @@ __all__ = [
     "Event",
     "Mission",
     "MissionError",
-    "Node",
     "find_component",
     "find_mission",
     "load_mission",
@@ -71,35 +68,6 @@ GRAPH_NODES = "graph.nodes"
 """Parameter that lists the nodes of the graph."""
 _OF_ROS = {name: flag(name, False, "") for name in ("use_sim_time", "start_type_description_service")}
 _MOST_NODES = 64
-
-
-@dataclass(frozen=True)
-class Node:
-    """A node of the graph as the mission describes it."""
-
-    name: str
-    package: str
-    executable: str
-    component: type[Component]
-    canonical: Mapping[str, Any]
-    values: Values
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        """Topics it listens to."""
-        return self.component.inputs(self.name, self.values)
-
-    @property
-    def outputs(self) -> tuple[Output, ...]:
-        """Topics it publishes."""
-        return self.component.all_outputs(self.name, self.values)
-
-    @property
-    def host(self) -> Host:
-        """What may fail of it."""
-        kind, values = self.component, self.values
-        own = kind.fault_units(values) if kind.fault_kinds else {}
-        return Host((*kind.fault_kinds, *LINK_KINDS), {**own, **kind.link_units(self.name, values)})
 
 
 class Mission:
@@ -154,7 +122,7 @@ class Mission:
             with _naming(origin, SHARED):
                 _refuse(missing(known.values(), self.values, (EPOCH.name,)))  # from which times count
         self.criteria = criteria_of(_below("criteria.", given), f"{origin}: {SHARED}")
-        self._check_wiring()
+        check_wiring(self.nodes, self.values.lockstep.wait_for, origin)
         with _naming(origin, SHARED):
             self.dispersions: tuple[Dispersion, ...] = dispersions_of(_below(dispersions.SECTION, given), self.known)
         self.remarks = tuple(self._unmeant())
@@ -439,51 +407,6 @@ class Mission:
             with _naming(self.origin, node.name):
                 _refuse(all_conflicts(node.component, values, node.name))
         return replace(node, canonical=canonical, values=values)
-
-    def _check_connection(self, node: Node, entry: Input, publisher: str, output: Output) -> None:
-        if entry.message_type is not output.message_type:
-            raise MissionError(
-                f"{self.origin}: {node.name} takes {entry.topic} as {type_name(entry.message_type)}, "
-                f"{publisher} publishes {type_name(output.message_type)}"
-            )
-        if node.values.io.input_matching == "exact" and output.events:
-            raise MissionError(
-                f"{self.origin}: {node.name} expects {entry.topic} for each step, "
-                f"{publisher} publishes it only when something happens"
-            )
-        if node.values.io.input_matching == "exact" and entry.divider % output.divider:
-            raise MissionError(
-                f"{self.origin}: {node.name} expects {entry.topic} every {entry.divider} steps, "
-                f"{publisher} publishes it every {output.divider}"
-            )
-
-    def _check_wiring(self) -> None:
-        publishers: dict[str, tuple[str, Output]] = {}
-        for node in self.nodes:
-            for output in node.outputs:
-                if output.topic in publishers:
-                    raise MissionError(
-                        f"{self.origin}: {node.name} and {publishers[output.topic][0]} both publish {output.topic}"
-                    )
-                publishers[output.topic] = node.name, output
-        for node in self.nodes:
-            for entry in node.inputs:
-                if entry.topic in publishers:
-                    self._check_connection(node, entry, *publishers[entry.topic])
-                elif entry.required and self.plant is not None:
-                    # without a plant nothing is simulated: devices publish what the nodes need
-                    raise MissionError(
-                        f"{self.origin}: {node.name} needs the topic {unknown_name(entry.topic, publishers)}; "
-                        "no node of graph.nodes publishes it"
-                    )
-        for topic in self.values.lockstep.wait_for:
-            if topic not in publishers:
-                raise MissionError(f"{self.origin}: {SHARED}: lockstep.wait_for: {unknown_name(topic, publishers)}")
-            name, output = publishers[topic]
-            if output.events:
-                raise MissionError(
-                    f"{self.origin}: {SHARED}: lockstep.wait_for: {name} publishes {topic} only when something happens"
-                )
 
 
 def _parsed(key: str, specification: Parameter, text: str) -> Any:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.kernel import kernel
-from css_common.matrices import IDENTITY
+from css_common.matrices import IDENTITY, inverse
 from css_common.schema import Parameter, Values
 from css_common.sections import MEASURED_FIELD_BIAS, MEASURED_FIELD_MATRIX, MEASURED_GYRO_BIAS
 from css_common.vectors import Mat3, Vec3, mat3, vector_of
@@ -49,7 +49,7 @@ def corrections(values: Values | None) -> Corrections:
         vector_of(np.radians(bias[0]) / 3600.0 if len(bias) else np.zeros(3)),
         bool(len(field_bias) or len(matrix)),
         vector_of(1e-9 * field_bias[0] if len(field_bias) else np.zeros(3)),
-        mat3(np.linalg.inv(matrix) if len(matrix) else np.eye(3)),
+        inverse(mat3(matrix)) if len(matrix) else IDENTITY,
     )
 
 

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from css_common import matrices
 from css_common.attitude import mrp_rate, mrp_shadow
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, add, cross, dot, mat3, multiply, norm, scale, subtract
@@ -93,15 +94,11 @@ def rigid_body(
     wheels["inertia"] = wheel_inertia
     wheels["max_torque"] = wheel_max_torque
     wheels["max_speed"] = np.asarray(wheel_max_speed_rpm) * _RADIANS_PER_RPM
-    inverse = np.linalg.inv(matrix)
+    inverse = matrices.inverse(mat3(matrix))
     unit_axes = np.column_stack([wheels["gx"], wheels["gy"], wheels["gz"]])
     wheels["coulomb"], wheels["viscous"] = wheel_friction
-    wheels["response"] = 1.0 / wheels["inertia"] + np.einsum("ij,jk,ik->i", unit_axes, inverse, unit_axes)
-    return RigidBody(_rows(matrix), _rows(inverse), wheels, int(substeps))
-
-
-def _rows(matrix: np.ndarray) -> Mat3:
-    return mat3(np.ascontiguousarray(matrix))
+    wheels["response"] = 1.0 / wheels["inertia"] + np.einsum("ij,jk,ik->i", unit_axes, np.array(inverse), unit_axes)
+    return RigidBody(mat3(matrix), inverse, wheels, int(substeps))
 
 
 @kernel

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from css_common.actuator_sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
 from css_common.component import Finding, Plant, Smoothing
-from css_common.mission import Node
+from css_common.mission_node import Node
 from css_common.schema import Values
-from css_common.sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
 from css_common.sensor_inputs import measures_rates
 from sunpoint_control.loop_stability import Gains, LoopModel, gain_findings
 from sunpoint_control.wheel_allocation import pseudo_inverse

@@ -7,13 +7,13 @@ from typing import ClassVar
 
 import numpy as np
 
+from css_common.actuator_sections import wheel_axes
 from css_common.codec import Sample
 from css_common.component import Component, Input, Outgoing, Output, Received
 from css_common.health import KIND_SCALED, KIND_SIGN, SORT_WHEEL, Verdict
 from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.schema import Values
-from css_common.sections import wheel_axes
 from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import ControlStatus, RodDipoleCommand, SunEstimate, WheelState, WheelTorqueCommand

@@ -18,11 +18,10 @@ wrong. A measurement that is missing or no number is passed over; after a gap al
 
 from typing import NamedTuple
 
-import numpy as np
-
 from css_common.attitude import rotation_vector_to_dcm
 from css_common.declared import builder, computed, given, table_of
 from css_common.kernel import kernel
+from css_common.matrices import inverse
 from css_common.schema import Values, real
 from css_common.vectors import Mat3, Vec3, add, cross, mat3, multiply, norm, scale, subtract, unit
 from sunpoint_control.held_field import HeldField
@@ -37,7 +36,7 @@ def _inertia(values: Values) -> Mat3:
 
 
 def _inertia_inverse(values: Values) -> Mat3:
-    return mat3(np.linalg.inv(values.spacecraft.inertia))
+    return inverse(_inertia(values))
 
 
 class FieldMotionParameters(NamedTuple):

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from css_common.actuator_sections import rod_max_dipoles
 from css_common.component import Finding, Plant
-from css_common.mission import Node
-from css_common.sections import rod_max_dipoles
+from css_common.mission_node import Node
 from sunpoint_control.magnetic_control import parameters
 
 _LARGEST_LAG = math.radians(60.0)  # half of the damping is left

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import rod_max_dipoles
 from css_common.declared import computed
 from css_common.kernel import kernel
 from css_common.schema import Values
-from css_common.sections import rod_max_dipoles
 from css_common.vectors import Vec3, axes_across, cross, dot, row, unit
 
 NO_FIELD = 1e-9

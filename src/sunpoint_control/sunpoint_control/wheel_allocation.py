@@ -8,15 +8,17 @@ clipped.
 """
 
 import math
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import WHEEL_AXES, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
 from css_common.declared import builder, computed, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, integers
-from css_common.sections import WHEEL_AXES, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel
-from css_common.vectors import Vec3, dot
+from css_common.vectors import Vec3, dot, multiply, vector_of
+from sunpoint_control.pseudo_inverse import NO_AXES, pseudo_inverse_of, with_axis
 
 WHEELS_OUT = integers("wheels_out", (), "-", "indices of wheels out of service, from 0", low=0, high=31, tunable=True)
 
@@ -29,12 +31,12 @@ WHEEL = np.dtype([(name, np.float64) for name in _FIELDS], align=True)
 
 
 def pseudo_inverse(axes_b: np.ndarray, out_of_service=()) -> np.ndarray:
-    """Map (n, 3) from a torque in b to wheel torques of least norm, for (n, 3) axes, by SVD."""
+    """Map (n, 3) from a torque in b to wheel torques of least norm, for (n, 3) axes."""
     axes = np.array(axes_b, dtype=np.float64)
     axes[list(out_of_service)] = 0.0
-    inverse = np.linalg.pinv(axes.T)
-    inverse[list(out_of_service)] = 0.0  # free of rounding
-    return inverse
+    of_axes = reduce(with_axis, map(vector_of, axes), NO_AXES)
+    inverse, _ = pseudo_inverse_of(of_axes)
+    return np.array([multiply(inverse, vector_of(axis)) for axis in axes]).reshape(-1, 3)
 
 
 def _wheels(values: Values) -> np.ndarray:

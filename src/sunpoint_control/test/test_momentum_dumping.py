@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from okeefe_spacecraft import okeefe_values
 
-from css_common.sections import RODS, WHEELS
+from css_common.actuator_sections import RODS, WHEELS
 from sunpoint_control import momentum_dumping, wheel_allocation
 from sunpoint_control.momentum_dumping import add_dumping
 from sunpoint_control.torque_rods import rod_dipoles, rod_torque

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from okeefe_spacecraft import okeefe_values
 
-from css_common.sections import WHEELS
+from css_common.actuator_sections import WHEELS
 from css_common.vectors import vector_of
 from sunpoint_control import wheel_allocation
 from sunpoint_control.wheel_allocation import WHEEL, allocate, limit_torques, pseudo_inverse, wheel_momentum

@@ -7,10 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import WHEEL_INERTIA, of_each_wheel
 from css_common.conversions import square
 from css_common.declared import computed, given, made, merged, part, table_of
+from css_common.matrices import IDENTITY, inverse
 from css_common.schema import Values, choice, flag, real, reals
-from css_common.sections import WHEEL_INERTIA, of_each_wheel
 from css_common.vectors import Mat3, mat3
 from css_environment.albedo import Screen, plane_screen, with_views
 from css_estimation.sun import flight_sky
@@ -108,10 +109,12 @@ def _knows_momentum(values: Values) -> bool:
 def _inertia(values: Values) -> Mat3:
     """With the wheels' spin inertia along their axes, which the section leaves out; the identity when it is unknown."""
     if not len(values.spacecraft.inertia):
-        return mat3(np.eye(3))
+        return IDENTITY
     axes = np.asarray(values.wheels.axes, dtype=np.float64).reshape(-1, 3)
     body = np.asarray(values.spacecraft.inertia, dtype=np.float64).reshape(3, 3)
-    return mat3(body + (of_each_wheel(values, WHEEL_INERTIA) * axes.T @ axes if values.wheels.fitted else 0.0))
+    if not values.wheels.fitted:
+        return mat3(body)
+    return mat3(body + np.einsum("n,ni,nj->ij", of_each_wheel(values, WHEEL_INERTIA), axes, axes))
 
 
 def _anisotropy(values: Values) -> float:
@@ -120,7 +123,7 @@ def _anisotropy(values: Values) -> float:
 
 
 def _inverse_inertia(values: Values) -> Mat3:
-    return mat3(np.linalg.inv(np.array(_inertia(values))))
+    return inverse(_inertia(values))
 
 
 class Response(NamedTuple):

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from css_common.component import Finding
-from css_common.mission import Node
+from css_common.mission_node import Node
 from css_common.run import node_main
 from css_common.schema import Values
 from sunpoint_control import magnetic_control

@@ -4,11 +4,11 @@
 from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
+from css_common.actuator_sections import needed_of_wheels
 from css_common.component import Finding
-from css_common.mission import Node
+from css_common.mission_node import Node
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import needed_of_wheels
 from sunpoint_control import sun_pointing_control
 from sunpoint_control.control_algorithm import ControlAlgorithm
 from sunpoint_control.control_checks import control_findings
