@@ -33,6 +33,8 @@ def test_a_stuck_cell_is_left_out_and_costs_no_more_than_its_absence(log, name):
     # 20 readings or more of a body that turns slowly, one a second
     found_s = told[0].begin_s
     assert BEGIN_S < found_s < BEGIN_S + 60.0
+    columns = log.attitudes[name]
+    np.testing.assert_array_equal(columns.isolated, np.where(log.time(columns) < found_s, 0, 1))
     steps, errors, _ = attitude_errors(log, name)
     time_s = steps * log.mission.period_ns * 1e-9
     assert errors[time_s > found_s].mean() < 1.5 * errors[time_s < BEGIN_S].mean()
@@ -53,3 +55,4 @@ def test_earthlight_leaves_out_what_the_sun_filter_beside_it_does():
         for name in ("sun_filter", "earthlight")
     }
     assert found["earthlight"] and found["earthlight"] == found["sun_filter"]
+    assert log.attitudes["earthlight"].isolated[-1] == log.estimates["sun_filter"].isolated[-1] == 1

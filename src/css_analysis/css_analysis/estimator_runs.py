@@ -39,9 +39,8 @@ def estimator_runs(log: FlightLog, names: Iterable[str] | None = None, flown: st
 
 def _isolated_cells(log: FlightLog, name: str) -> list[int]:
     """Numbers of the cells that an estimator left out at some time for failed."""
-    if name not in log.estimates:
-        return []
-    ever = int(np.bitwise_or.reduce(log.estimates[name].isolated))
+    columns = log.estimates[name] if name in log.estimates else log.attitudes[name]
+    ever = int(np.bitwise_or.reduce(columns.isolated))
     return [i for i in range(32) if ever >> i & 1]
 
 

@@ -45,8 +45,9 @@ def held_spells(log: FlightLog) -> list[Spell]:
 
 def _masks(log: FlightLog) -> Iterator[tuple[str, str, Columns, np.ndarray]]:
     """Who holds which unit for failed, and at which messages."""
-    for name, columns in log.estimates.items():
+    for name, columns in (*log.estimates.items(), *log.attitudes.items()):
         yield from _bits(name, "cell", columns, columns.isolated)
+    for name, columns in log.estimates.items():
         for target, bits in _SENSORS.items():
             on = (columns.sensors_left & bits) != 0
             if on.any():

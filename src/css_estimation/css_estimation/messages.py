@@ -78,6 +78,7 @@ def attitude_estimate_fields(solution: AttitudeSolution, covariance: np.ndarray)
         "delay": 0.0,
         "nis": solution.nis,
         "lit_mask": solution.lit_mask,
+        "isolated": solution.isolated,
         "nis_dof": solution.nis_dof,
         "validity": solution.validity,
         "used": solution.used,

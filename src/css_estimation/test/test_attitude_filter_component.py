@@ -57,8 +57,8 @@ def test_it_finds_the_attitude_and_its_message_fits_the_type(model, references):
     codec = codec_of(AttitudeEstimate)
     for estimate in run(AttitudeFilter("left", values_of(sun_model=model)), references):
         data = codec.encode(estimate)
-        # no padding inside: 16 bytes of header, 49 doubles, 8 bytes
-        assert len(data) == 4 + 16 + 49 * 8 + 8
+        # no padding inside: 16 bytes of header, 49 doubles, 12 bytes
+        assert len(data) == 4 + 16 + 49 * 8 + 12
         again = codec.decode(data)
         for entry in codec.fields:
             np.testing.assert_array_equal(getattr(again, entry.name), getattr(estimate, entry.name))
@@ -100,6 +100,22 @@ def test_a_sensor_that_says_off_is_the_same_as_a_silent_one(sensors, references)
         uses.append(a.used)
     lost = AttitudeEstimate.USED_GYRO if "gyro" in sensors else AttitudeEstimate.USED_FIELD
     assert not uses[-1] & lost
+
+
+def test_a_cell_that_no_sun_explains_is_in_the_mask_of_what_is_left_out(references):
+    component = AttitudeFilter("left", values_of())
+    *_, healthy = run(component, references)
+    assert not healthy.isolated
+    for k in range(20, 200):
+        stamp_ns = component.epoch_ns + k * component.period_ns
+        inputs = received(component, stamp_ns, references)
+        voltages = np.array(inputs["cells"].voltages)
+        voltages[3] = 3.0
+        inputs["cells"] = codec_of(CssVoltages).sample(stamp_ns, "bus", voltages=voltages)
+        told = component.cycle(stamp_ns, inputs)["attitude"]
+    assert isinstance(told, Sample)
+    assert told.isolated == 1 << 3
+    assert told.validity == AttitudeEstimate.VALIDITY_VALID
 
 
 def test_without_a_field_it_says_that_it_knows_nothing(references):

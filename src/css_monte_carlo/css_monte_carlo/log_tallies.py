@@ -177,7 +177,7 @@ def _heading(estimates, row: int) -> SunHeading:
 
 def _solution(attitudes, row: int) -> AttitudeSolution:
     a = attitudes
-    numbers = (a.nis_dof, a.lit_mask, a.validity, a.used, a.mode)
+    numbers = (a.nis_dof, a.lit_mask, a.validity, a.used, a.mode, a.isolated)
     return AttitudeSolution(
         _vec3(quaternion_to_mrp(tuple(a.q_bn[row].tolist()))) if a.validity[row] else _ZERO,
         _vec3(a.omega_bn_b[row]),

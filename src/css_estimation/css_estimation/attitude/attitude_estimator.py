@@ -9,9 +9,9 @@ from typing import Any, ClassVar
 from css_common.component import Component, Finding, Outgoing, Output, Received, Standing
 from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
-from css_common.mission import Node
+from css_common.mission_node import Node
+from css_common.orbit_section import needed_of_orbit
 from css_common.schema import Values
-from css_common.sections import needed_of_orbit
 from css_estimation.health.cell_options import ENABLED
 from css_estimation.messages import attitude_estimate_fields
 from css_msgs.msg import AttitudeEstimate

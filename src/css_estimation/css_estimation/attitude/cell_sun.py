@@ -100,6 +100,11 @@ class CellSun:
         """How many have been judged."""
         return self._state.step
 
+    @property
+    def isolated(self) -> int:
+        """Mask of the cells that are held for failed."""
+        return self._state.isolated
+
     def trusted(self, voltages: np.ndarray, dt: float, at: EnvironmentState) -> np.ndarray:
         """The outputs (N,) of a cycle that can be trusted, NaN for the others.
 

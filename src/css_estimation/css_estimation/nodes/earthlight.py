@@ -5,10 +5,10 @@ from collections.abc import Iterable
 from types import ModuleType
 from typing import Any, ClassVar
 
+from css_common.actuator_sections import needed_of_wheel_momentum
 from css_common.component import Input, Received
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import needed_of_wheel_momentum
 from css_estimation.attitude.attitude_estimator import AttitudeEstimator
 from css_estimation.sun.flight_sky import flight_sky, sky_at
 from css_estimation.sun.sun_estimator import aiding_of, inputs_of

@@ -11,10 +11,10 @@ from css_common.attitude import dcm_to_quaternion
 from css_common.component import Component, Finding, Input, Outgoing, Output, Received, Standing
 from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
-from css_common.mission import Node
+from css_common.mission_node import Node
+from css_common.orbit_section import needed_of_orbit
 from css_common.run import node_main
 from css_common.schema import Values, choice
-from css_common.sections import needed_of_orbit
 from css_common.sensor_inputs import field_input
 from css_common.vectors import Vec3, norm, vector_of
 from css_environment.mission_environment import MissionEnvironment
@@ -124,7 +124,8 @@ class Triad(Component):
 
     def cycle(self, stamp_ns: int, received: Received) -> Outgoing:
         fresh = self._by_slits(stamp_ns, received) if self._cell_sun is None else self._by_cells(stamp_ns, received)
-        attitude = self.message("attitude", stamp_ns, **self._fields(stamp_ns, fresh))
+        isolated = 0 if self._cell_sun is None else self._cell_sun.isolated
+        attitude = self.message("attitude", stamp_ns, isolated=isolated, **self._fields(stamp_ns, fresh))
         return {"attitude": attitude, **self._told_health(stamp_ns)}
 
     def _told_health(self, stamp_ns: int) -> Outgoing:

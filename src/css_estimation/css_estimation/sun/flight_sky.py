@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 from css_common.declared import given, part, table_of
 from css_common.epochs import mission_epoch
+from css_common.orbit_section import ORBIT_SOURCE
 from css_common.schema import Values, flag
-from css_common.sections import ORBIT_SOURCE
 from css_environment.mission_environment import MissionEnvironment
 from css_estimation.mean_earth import MeanEarth, PredictedLight
 from css_estimation.sun.eclipse_detector import SOURCE

@@ -6,14 +6,16 @@ from typing import ClassVar
 
 import numpy as np
 
+from css_common.actuator_sections import needed_of_wheel_momentum
 from css_common.component import Component, Cycles, Finding, Input, Outgoing, Output, Received, Smoothing, Standing
 from css_common.declared import merged
 from css_common.health_report import HealthReport, health_output
 from css_common.kernel import typed_call
 from css_common.message_columns import Columns
-from css_common.mission import Node
+from css_common.mission_node import Node
+from css_common.mission_section import PERIOD
+from css_common.orbit_section import needed_of_orbit
 from css_common.schema import Table, Values
-from css_common.sections import PERIOD, needed_of_orbit, needed_of_wheel_momentum
 from css_common.sensor_inputs import FULL_SUN_LUX, field_input, gyro_input, sunlight_input
 from css_estimation.health import watched
 from css_estimation.messages import cells_input, sun_estimate_fields, wheels_input
