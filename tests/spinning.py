@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 
 from css_common.epochs import parse_utc
+from css_common.mission_section import MISSION
+from css_common.orbit_section import ORBIT
 from css_common.random_streams import random_key
 from css_common.schema import Values, default_values
-from css_common.sections import MISSION, ORBIT
 from css_environment.ephemeris import at, build_ephemeris
 from css_environment.mission_environment import mission_orbit
 from css_estimation.spin import slit_measurement

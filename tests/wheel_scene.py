@@ -6,9 +6,10 @@ import math
 import numpy as np
 from okeefe_spacecraft import okeefe_values
 
+from css_common.actuator_sections import RODS, WHEELS
 from css_common.attitude import mrp_rate, mrp_shadow, mrp_to_dcm
 from css_common.health import SORT_WHEEL, verdicts_of
-from css_common.sections import RODS, SPACECRAFT, WHEELS
+from css_common.sections import SPACECRAFT
 from css_common.vectors import angle_between, multiply
 from sunpoint_control import sun_pointing_control as control
 from sunpoint_control.held_field import HeldField

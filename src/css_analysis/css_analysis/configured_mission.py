@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A mission with another estimator, another case or without its gyro: as studies fly it, and as a command says it."""
 
-from css_common.mission import Mission, MissionError, Node
+from css_common.mission import Mission, MissionError
+from css_common.mission_node import Node
 from css_common.sensor_inputs import measures_rates, uses_gyro
 from css_msgs.msg import AttitudeEstimate
 

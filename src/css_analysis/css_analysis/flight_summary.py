@@ -5,7 +5,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from css_analysis.estimator_runs import Run
-from css_analysis.quantities import QUANTITIES, Quantity
+from css_analysis.quantities import QUANTITIES
+from css_analysis.quantity import Quantity
 from css_analysis.readable_table import ReadableTable
 from css_common.schema import unknown_name
 

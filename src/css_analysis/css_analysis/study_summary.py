@@ -10,7 +10,8 @@ import pyarrow.compute as pc
 
 from css_analysis.flight_metrics import windows_of
 from css_analysis.intervals import Interval, mean_interval, percentile_interval, share_interval
-from css_analysis.quantities import Summary, attitude_summaries, summaries
+from css_analysis.quantities import attitude_summaries, summaries
+from css_analysis.quantity import Summary
 from css_analysis.study_record import StudyRecord
 from css_common.mission import mission_from_text
 

@@ -11,8 +11,9 @@ from css_bringup.flight_changes import ParameterChange, settings_in_flight
 from css_bringup.retracing import Given, Retrace
 from css_common.component import Cycles, Input, Output, Received
 from css_common.matching import Matcher
-from css_common.mission import Event, Mission, Node, find_component
+from css_common.mission import Event, Mission, find_component
 from css_common.mission_file import MissionError
+from css_common.mission_node import Node
 from css_common.schema import shaped_values
 from css_common.sensor_inputs import uses_gyro
 from css_common.stepping import Stepper

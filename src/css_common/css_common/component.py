@@ -19,14 +19,14 @@ from css_common.epochs import mission_epoch
 from css_common.fault_lines import FaultKind, Units
 from css_common.link_kinds import LINK_FAULTS
 from css_common.message_columns import Columns
+from css_common.mission_section import DURATION, EPOCH
 from css_common.readings import Readings
 from css_common.schema import Table, Values, missing
-from css_common.sections import DURATION, EPOCH
 from css_common.shared_sections import conflicts, section_table
 from css_msgs.msg import Faults
 
 if TYPE_CHECKING:
-    from css_common.mission import Node
+    from css_common.mission_node import Node
 
 BODY = "body"
 INERTIAL = "inertial"

@@ -31,8 +31,8 @@ from css_common.link_kinds import (
     SORTS,
     of_sorts,
 )
+from css_common.mission_section import CASE, PERIOD, SEED
 from css_common.random_streams import Stream, random_key, uniform4
-from css_common.sections import CASE, PERIOD, SEED
 
 if TYPE_CHECKING:
     from css_common.stepping import Port

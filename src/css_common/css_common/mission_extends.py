@@ -13,9 +13,9 @@ from typing import Any
 
 from css_common.mission_file import MissionError, flattened, read_sections, read_text
 from css_common.mission_lookup import find_mission
+from css_common.mission_section import name_for_files
 from css_common.parameter_sections import Sections, is_for, is_shared, merged_files, shared_by_all
 from css_common.schema import shown
-from css_common.sections import name_for_files
 
 EXTENDS = "extends"
 """Key that names the other mission."""

@@ -12,8 +12,9 @@ from dataclasses import replace
 from itertools import groupby
 
 from css_common.component import Component, Finding, missing_values
-from css_common.mission import SHARED, Mission, Node
+from css_common.mission import SHARED, Mission
 from css_common.mission_file import MissionError
+from css_common.mission_node import Node
 from css_common.schema import shaped_values
 from css_common.shared_sections import shared_parameters
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from sensor_msgs.msg import Illuminance, Imu, MagneticField
 
 from css_common.component import Component, Input
-from css_common.mission import Node
+from css_common.mission_node import Node
 from css_common.schema import Values
 
 RATES = "gyro/imu"

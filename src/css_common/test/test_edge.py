@@ -10,9 +10,10 @@ from sensor_msgs.msg import Imu
 from css_common.codec import Sample, codec_of
 from css_common.component import INERTIAL, Input
 from css_common.edge import CONFIRMATIONS_BACK, HISTORY, Edge, StampGuard
+from css_common.mission_section import MISSION
 from css_common.readings import Readings
 from css_common.schema import default_values
-from css_common.sections import IO, MISSION
+from css_common.sections import IO
 from css_msgs.msg import CssVoltages, SpacecraftState
 
 SECOND = 1_000_000_000

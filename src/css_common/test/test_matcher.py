@@ -16,8 +16,9 @@ from css_common.component import Component, Input
 from css_common.edge import HISTORY, StampGuard
 from css_common.matching import Matcher
 from css_common.message_columns import Columns
+from css_common.mission_section import MISSION
 from css_common.schema import default_values
-from css_common.sections import IO, MISSION
+from css_common.sections import IO
 from css_msgs.msg import CssVoltages
 
 SECOND = 1_000_000_000

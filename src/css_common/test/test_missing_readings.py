@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from css_common.codec import codec_of
 from css_common.component import Input
 from css_common.edge import Edge
+from css_common.mission_section import MISSION
 from css_common.readings import Readings, all_readable, clear_unreadable
 from css_common.schema import default_values
-from css_common.sections import IO, MISSION
+from css_common.sections import IO
 from css_msgs.msg import CssVoltages
 
 CODEC = codec_of(CssVoltages)

@@ -6,8 +6,8 @@ import pytest
 
 from css_common.epochs import mission_epoch, parse_utc
 from css_common.mission import MissionError, load_mission
+from css_common.mission_section import MISSION
 from css_common.schema import default_values
-from css_common.sections import MISSION
 
 DAY_NS = 86_400 * 10**9
 

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from css_common.mission import Mission, find_mission, load_mission, mission_from_text
 from css_common.mission_file import MissionError, read_text
+from css_common.mission_section import name_for_files
 from css_common.places import SECTIONS_INDEX
-from css_common.sections import name_for_files
 
 HEAD = """\
 /**:

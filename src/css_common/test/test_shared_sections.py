@@ -3,7 +3,7 @@
 
 import pytest
 
-from css_common import sections
+from css_common import actuator_sections, sections
 from css_common.places import SECTIONS_INDEX
 from css_common.schema import checked_values, default_values, shaped_values
 from css_common.shared_sections import conflicts, section_table, shared_parameters, shared_sections
@@ -70,9 +70,11 @@ def test_inertia_of_a_flat_plate_passes():
 
 def test_a_spacecraft_without_wheels_has_no_axes():
     axes = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
-    fitted, bare = (default_values(sections.WHEELS, wheels__fitted=word, wheels__axes=axes) for word in (True, False))
-    assert sections.wheel_axes(fitted).shape == (3, 3)
-    assert sections.wheel_axes(bare).shape == (0, 3)
+    fitted, bare = (
+        default_values(actuator_sections.WHEELS, wheels__fitted=word, wheels__axes=axes) for word in (True, False)
+    )
+    assert actuator_sections.wheel_axes(fitted).shape == (3, 3)
+    assert actuator_sections.wheel_axes(bare).shape == (0, 3)
 
 
 def installed(tmp_path, monkeypatch, package, source):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from css_common.mission_section import PERIOD
 from css_common.schema import Table, Values, choice, integer, integers, real, reals, text, texts
-from css_common.sections import PERIOD
 from css_drivers import adc128d818, ads1115, mcp3208
 from css_drivers.adc128d818 import Adc128d818
 from css_drivers.ads1115 import Ads1115

@@ -9,8 +9,7 @@ from functools import lru_cache
 
 from css_common.epochs import mission_epoch
 from css_common.kernel import typed_call
-from css_common.schema import Values
-from css_common.sections import (
+from css_common.orbit_section import (
     LAUNCH_APOGEE,
     LAUNCH_AZIMUTH,
     LAUNCH_ELEVATION,
@@ -18,6 +17,7 @@ from css_common.sections import (
     LAUNCH_LATITUDE,
     LAUNCH_LONGITUDE,
 )
+from css_common.schema import Values
 from css_environment import ephemeris
 from css_environment.ballistic import Launch, ballistic_arc
 from css_environment.constants import EARTH_RADIUS

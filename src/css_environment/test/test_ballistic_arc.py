@@ -10,8 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from css_common.epochs import parse_utc
+from css_common.mission_section import MISSION
+from css_common.orbit_section import ORBIT
 from css_common.schema import default_values
-from css_common.sections import MISSION, ORBIT
 from css_environment.ballistic import Launch, ballistic_arc, geodetic_heights, local_direction_n
 from css_environment.constants import EARTH_MU
 from css_environment.earth_rotation import dcm_en_at

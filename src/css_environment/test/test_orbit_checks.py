@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from css_common.epochs import parse_utc
+from css_common.mission_section import MISSION
+from css_common.orbit_section import ORBIT
 from css_common.schema import shaped_values
-from css_common.sections import MISSION, ORBIT
 from css_environment.magnetic_field import field_along_orbit
 from css_environment.orbit import TleOrbit
 from css_environment.orbit_checks import field_findings, orbit_findings, recorded_orbit_findings

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from css_common.component import Component, Plant
-from css_common.mission import Mission, Node
+from css_common.mission import Mission
+from css_common.mission_node import Node
 from css_common.schema import Values, unknown_name
 from css_environment.earth_light import new_light
 from css_estimation.attitude import sun_field_attitude

@@ -13,7 +13,8 @@ from typing import Any
 from css_common.codec import codec_of
 from css_common.edge import Edge
 from css_common.matching import Matcher
-from css_common.mission import Mission, Node
+from css_common.mission import Mission
+from css_common.mission_node import Node
 from css_common.stepping import Stepper
 from css_export.c_main import BEGIN, PARAMETERS, STEP, state_hash, word
 from css_export.errors import ExportError

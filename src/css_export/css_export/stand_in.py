@@ -25,7 +25,7 @@ import numpy as np
 
 from css_common.component import Component
 from css_common.component_error import ComponentError
-from css_common.mission import Node
+from css_common.mission_node import Node
 from css_export.c_main import LAYOUT, PARAMETERS, STATE, STEP, word
 from css_export.entry import Interface, interface_of
 from css_export.errors import ExportError

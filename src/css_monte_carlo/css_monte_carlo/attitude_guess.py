@@ -4,7 +4,8 @@
 import math
 
 from css_common.attitude import mrp_add, rotation_vector_to_mrp
-from css_common.mission import Mission, Node
+from css_common.mission import Mission
+from css_common.mission_node import Node
 from css_common.random_streams import RandomKey, Stream, normal4
 from css_common.vectors import Vec3
 from css_estimation.attitude.attitude_options import GivenStart

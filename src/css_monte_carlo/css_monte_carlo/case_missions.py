@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
+from css_common.actuator_sections import RODS_FITTED
 from css_common.dispersions import Dispersion
 from css_common.drawn_mission import drawn, drawn_values
 from css_common.mission import Mission, MissionError
+from css_common.mission_section import MISSION
+from css_common.orbit_section import ORBIT
 from css_common.preflight import preflight
 from css_common.schema import Table
-from css_common.sections import MISSION, ORBIT, RODS_FITTED
 from css_estimation.attitude import flight_references
 from css_estimation.sun import flight_sky
 from css_estimation.sun.eclipse_detector import SOURCE

@@ -5,7 +5,7 @@ import numpy as np
 import pyarrow as pa
 
 from css_analysis.flight_metrics import Windows
-from css_analysis.quantities import CaseSums
+from css_analysis.quantity import CaseSums
 from css_monte_carlo.case_tallies import BIN_DEG, Tallies
 from css_monte_carlo.measures import ATTITUDE, HEADING, CaseTallies, Measure
 

@@ -18,7 +18,8 @@ from css_analysis.body_axes import axes_about
 from css_common.case_faults import NEVER
 from css_common.component import Component
 from css_common.kernel import outer_kernel
-from css_common.mission import Mission, Node
+from css_common.mission import Mission
+from css_common.mission_node import Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values
 from css_common.vectors import Mat3, Vec3, angle_between, mat3, multiply_transposed

@@ -16,7 +16,8 @@ from css_common.codec import Sample, codec_of
 from css_common.component import Outgoing, Plant
 from css_common.link_kinds import MESSAGES_FAIL, SORTS
 from css_common.message_columns import Columns
-from css_common.mission import Mission, MissionError, Node
+from css_common.mission import Mission, MissionError
+from css_common.mission_node import Node
 from css_common.preflight import preflight, report
 from css_common.schema import unknown_name
 from css_common.stepping import Stepper

@@ -9,9 +9,10 @@ import pyarrow as pa
 from css_analysis.fault_record import case_record, fault_texts
 from css_common.case_faults import CaseFault
 from css_common.fault_lines import FAULTS
-from css_common.mission import Mission, Node
+from css_common.mission import Mission
+from css_common.mission_node import Node
+from css_common.mission_section import PERIOD
 from css_common.random_streams import RandomKey, random_key
-from css_common.sections import PERIOD
 from css_monte_carlo.case_missions import case_mission
 from css_sim import cell_faults, faults
 from css_sim.nodes.css_array import CssArray

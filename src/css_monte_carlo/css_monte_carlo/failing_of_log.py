@@ -10,7 +10,8 @@ from css_common.case_faults import NEVER
 from css_common.codec import Sample
 from css_common.fault_lines import FAULTS
 from css_common.kernel import typed_call
-from css_common.mission import Mission, Node
+from css_common.mission import Mission
+from css_common.mission_node import Node
 from css_common.stepping import Stepper
 from css_monte_carlo.failing_units import NOTHING_FAILS, Failing, evident_cells, failing_units, uncertainty_of
 from css_monte_carlo.health_tallies import UNITS

@@ -5,14 +5,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from css_analysis.flight_metrics import Windows
-from css_analysis.quantities import (
-    Quantity,
-    Summary,
-    attitude_quantities,
-    attitude_summaries,
-    study_quantities,
-    summaries,
-)
+from css_analysis.quantities import attitude_quantities, attitude_summaries, study_quantities, summaries
+from css_analysis.quantity import Quantity, Summary
 from css_monte_carlo import attitude_tallies, case_tallies
 from css_monte_carlo.attitude_tallies import AttitudeTallies
 from css_monte_carlo.case_tallies import Tallies

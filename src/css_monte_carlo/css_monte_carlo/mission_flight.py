@@ -9,10 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_analysis.flight_metrics import windows_of
-from css_common.mission import Event, Mission, Node
+from css_common.actuator_sections import wheel_axes
+from css_common.mission import Event, Mission
+from css_common.mission_node import Node
 from css_common.random_streams import RandomKey, random_key
 from css_common.schema import Values, default_values, shaped_values
-from css_common.sections import wheel_axes
 from css_common.stepping import first_step
 from css_common.vectors import Vec3
 from css_environment.albedo import new_workspace

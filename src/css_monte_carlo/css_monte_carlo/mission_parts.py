@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 from css_analysis.configured_mission import is_attitude
 from css_common.component import Component
-from css_common.mission import Mission, MissionError, Node
+from css_common.mission import Mission, MissionError
+from css_common.mission_node import Node
 from css_estimation.nodes.attitude_filter import AttitudeFilter
 from css_estimation.nodes.earthlight import Earthlight
 from css_estimation.sun.flight_sky import hears_flag

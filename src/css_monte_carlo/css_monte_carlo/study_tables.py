@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from rich.console import Console
 
 from css_analysis.intervals import beyond_largest
-from css_analysis.quantities import Summary
+from css_analysis.quantity import Summary
 from css_analysis.readable_table import ReadableTable
 from css_analysis.study_health import health_of_cases
 from css_analysis.study_summary import summaries_of

@@ -20,10 +20,10 @@ from css_analysis.flight_metrics import windows_of
 from css_analysis.study_summary import rows_of, summaries_of
 from css_common.drawn_mission import values_at
 from css_common.mission import Mission, MissionError
+from css_common.mission_section import name_for_files
 from css_common.preflight import preflight
 from css_common.sampling import sample_of
 from css_common.schema import ParameterError
-from css_common.sections import name_for_files
 from css_common.whole_files import write_whole
 from css_monte_carlo.case_missions import share_surroundings
 from css_monte_carlo.case_table import case_table

@@ -9,7 +9,7 @@ from css_analysis.configured_mission import configured
 from css_analysis.estimate_errors import tangent_nees
 from css_analysis.estimator_runs import estimator_runs
 from css_analysis.flight_metrics import Windows, acquisition, sunlit_passes, windows_of
-from css_analysis.quantities import percentile_of_histogram
+from css_analysis.sum_measures import percentile_of_histogram
 from css_common.mission import load_mission
 from css_monte_carlo.case_table import case_table
 from css_monte_carlo.case_tallies import BIN_DEG, SAMPLED, sample_count, step_marks

@@ -9,7 +9,7 @@ import numpy as np
 from css_analysis.cell_outputs import NO_ERRORS, Cells
 from css_analysis.flight_log import FlightLog
 from css_analysis.palette import BLACK, BLUE, ORANGE
-from css_common.mission import Node
+from css_common.mission_node import Node
 from css_common.random_streams import random_key
 from css_environment.earth_rotation import dcm_en_at
 from css_environment.reflectivity import reflectivity_at

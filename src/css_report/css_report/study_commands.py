@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_analysis.configured_mission import configuring_overrides
-from css_analysis.quantities import Summary
+from css_analysis.quantity import Summary
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import summaries_of
 from css_common.mission import Mission, MissionError, load_mission, mission_from_text

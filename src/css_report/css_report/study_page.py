@@ -7,7 +7,7 @@ from typing import Any
 
 from css_analysis.flight_metrics import windows_of
 from css_analysis.intervals import Interval
-from css_analysis.quantities import Summary
+from css_analysis.quantity import Summary
 from css_analysis.study_criteria import judge
 from css_analysis.study_health import health_of_cases
 from css_analysis.study_record import StudyRecord

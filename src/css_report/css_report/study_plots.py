@@ -10,7 +10,8 @@ import pyarrow as pa
 
 from css_analysis.flight_metrics import Windows
 from css_analysis.intervals import share_interval
-from css_analysis.quantities import Quantity, quantities
+from css_analysis.quantities import quantities
+from css_analysis.quantity import Quantity
 from css_analysis.study_record import StudyRecord
 from css_analysis.study_summary import rows_of
 from css_report.blocks import Plot

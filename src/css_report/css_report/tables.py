@@ -7,7 +7,8 @@ from css_analysis.estimator_runs import Run
 from css_analysis.flight_log import FlightLog
 from css_analysis.flight_metrics import windows_of
 from css_analysis.flight_summary import Verdict
-from css_analysis.quantities import Quantity, flight_quantities
+from css_analysis.quantities import flight_quantities
+from css_analysis.quantity import Quantity
 from css_report.blocks import MISSES, Table
 
 NONE = "-"

@@ -33,7 +33,7 @@ from css_sensors.cells import (
 from css_sensors.corrections import corrections, given, of_field, of_output, of_rate
 
 if TYPE_CHECKING:
-    from css_common.mission import Node
+    from css_common.mission_node import Node
 
 TEMPERATURE_TOPIC = "css/temperature"
 HELD_S = 600.0

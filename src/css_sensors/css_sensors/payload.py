@@ -5,8 +5,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from css_common.orbit_section import LAUNCH_LATITUDE, LAUNCH_LONGITUDE
 from css_common.schema import Table, Values, real, reals
-from css_common.sections import LAUNCH_LATITUDE, LAUNCH_LONGITUDE
 
 AXIS_AZIMUTH = real(
     "payload.axis_azimuth_deg",

@@ -5,12 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import ROD_AXES, RODS_FITTED, WHEELS_FITTED, wheel_axes
 from css_common.case_faults import CaseFault, CaseFaults
 from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import kernel
+from css_common.mission_section import PERIOD
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
-from css_common.sections import PERIOD, ROD_AXES, RODS_FITTED, WHEELS_FITTED, wheel_axes
 from css_sim import faults
 from css_sim.fault_effects import DEAD, FRICTION, ROD, SLOW, WHEEL, acts, spoil
 from css_sim.fault_kinds import kinds_of

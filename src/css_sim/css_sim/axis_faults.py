@@ -3,9 +3,9 @@
 
 from css_common.case_faults import CaseFault, CaseFaults
 from css_common.fault_lines import FAULTS, Units
+from css_common.mission_section import PERIOD
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
-from css_common.sections import PERIOD
 from css_sim import faults
 from css_sim.fault_kinds import AXES, kinds_of
 

@@ -10,9 +10,9 @@ from css_common.case_faults import NEVER, CaseFault, CaseFaults, step_of
 from css_common.declared import builder, given, part, table_of
 from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import kernel
+from css_common.mission_section import PERIOD
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values, choice, integer, real
-from css_common.sections import PERIOD
 from css_sensors.cells import NORMALS
 from css_sim import faults
 from css_sim.fault_effects import CELL, DEAD, SHADOWED, STUCK, acts

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from css_common.declared import builder, given, made, table_of
+from css_common.mission_section import DURATION
 from css_common.random_streams import RandomKey
 from css_common.schema import Values, choice, flag, real, text
-from css_common.sections import DURATION
 from css_environment.moving_clouds import (
     COMMON,
     CORRELATED,

@@ -7,16 +7,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from css_common.component import Finding
-from css_common.mission import Node
-from css_common.schema import Values
-from css_common.sections import (
-    ALTITUDE,
-    DURATION,
-    ECCENTRICITY,
-    INERTIA,
-    ORBIT_SOURCE,
-    PERIOD,
+from css_common.actuator_sections import (
     RODS_FITTED,
     WHEEL_INERTIA,
     WHEEL_MAX_SPEED,
@@ -26,6 +17,12 @@ from css_common.sections import (
     rod_max_dipoles,
     wheel_axes,
 )
+from css_common.component import Finding
+from css_common.mission_node import Node
+from css_common.mission_section import DURATION, PERIOD
+from css_common.orbit_section import ALTITUDE, ECCENTRICITY, ORBIT_SOURCE
+from css_common.schema import Values
+from css_common.sections import INERTIA
 from css_common.vectors import Vec3
 from css_environment.constants import EARTH_MU, EARTH_RADIUS
 from css_environment.orbit_checks import field_findings, orbit_findings

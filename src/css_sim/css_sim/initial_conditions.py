@@ -10,12 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel, wheel_axes
 from css_common.attitude import mrp_shadow, quaternion_to_mrp
 from css_common.declared import builder, given, made, table_of
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey, Stream, normal4, uniform4
 from css_common.schema import Values, choice, real, reals
-from css_common.sections import INERTIA, WHEEL_INERTIA, WHEEL_MAX_SPEED, WHEEL_MAX_TORQUE, of_each_wheel, wheel_axes
+from css_common.sections import INERTIA
 from css_common.vectors import Vec3, vector_of
 from css_sim import wheel_friction
 from css_sim.disturbances import DIPOLE

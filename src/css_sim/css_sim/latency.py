@@ -16,9 +16,9 @@ import numpy as np
 
 from css_common.declared import builder, computed, table_of
 from css_common.kernel import kernel
+from css_common.mission_section import PERIOD
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values, real
-from css_common.sections import PERIOD
 from css_common.vectors import Vec3, add, dot, norm, scale, subtract
 
 CELLS, GYRO, MAGNETOMETER = 0, 1, 2

@@ -9,9 +9,9 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from css_common.declared import builder, given, made, table_of
+from css_common.orbit_section import ORBIT_SOURCE
 from css_common.random_streams import RandomKey, Stream, normal4
 from css_common.schema import Values, real
-from css_common.sections import ORBIT_SOURCE
 from css_environment.constants import EARTH_RADIUS
 from css_environment.mission_environment import mission_orbit
 from css_environment.orbit import IntegratedOrbit, KeplerianOrbit, Orbit

@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 from css_common.case_faults import CaseFault, CaseFaults
 from css_common.fault_lines import Units
+from css_common.mission_section import PERIOD
 from css_common.random_streams import RandomKey, Stream, uniform4
 from css_common.schema import Values
-from css_common.sections import PERIOD
 from css_sensors.slits import HEAD_AZIMUTHS, SLITS_PER_HEAD
 from css_sim import faults
 from css_sim.fault_effects import DEAD, DOUBLED, DROPPED, LATE, SPURIOUS

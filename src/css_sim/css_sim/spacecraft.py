@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import ROD_AXES, RODS_FITTED, rod_max_dipoles
 from css_common.attitude import mrp_to_dcm
 from css_common.kernel import kernel
 from css_common.random_streams import RandomKey
 from css_common.schema import Values
-from css_common.sections import ROD_AXES, RODS_FITTED, rod_max_dipoles
 from css_common.vectors import Vec3, add, cross, multiply
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances

@@ -9,8 +9,8 @@ from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
 from css_common.fault_lines import conflicts
+from css_common.mission_section import MISSION
 from css_common.random_streams import random_key
-from css_common.sections import MISSION
 from css_sensors.cells import CELLS
 from css_sim import cell_faults
 from css_sim.cell_faults import case_faults

@@ -10,9 +10,12 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
+from css_common.actuator_sections import WHEELS
+from css_common.mission_section import MISSION
+from css_common.orbit_section import ORBIT
 from css_common.random_streams import Stream, random_key
 from css_common.schema import default_values
-from css_common.sections import MISSION, ORBIT, SPACECRAFT, WHEELS
+from css_common.sections import SPACECRAFT
 from css_environment import moving_clouds
 from css_environment.orbit import KeplerianOrbit
 from css_environment.reflectivity import Reflectivity, draw_reflectivity

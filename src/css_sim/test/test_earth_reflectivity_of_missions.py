@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
+from css_common.mission_section import MISSION
 from css_common.random_streams import random_key
 from css_common.schema import default_values
-from css_common.sections import MISSION
 from css_environment.reflectivity import HIGHEST, LOWEST
 from css_sim import earth_reflectivity
 

@@ -8,9 +8,11 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 from scipy import stats
 
+from css_common.actuator_sections import WHEELS
 from css_common.attitude import mrp_to_dcm
+from css_common.mission_section import MISSION
 from css_common.random_streams import random_key
-from css_common.sections import MISSION, SPACECRAFT, WHEELS
+from css_common.sections import SPACECRAFT
 from css_sim import disturbances, initial_conditions
 from css_sim.rigid_body import wheel_speed
 

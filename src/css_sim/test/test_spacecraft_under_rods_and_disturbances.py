@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 from okeefe_spacecraft import okeefe_values
 
+from css_common.actuator_sections import RODS, WHEELS
 from css_common.attitude import mrp_to_dcm
+from css_common.mission_section import MISSION
 from css_common.random_streams import random_key
-from css_common.sections import MISSION, RODS, SPACECRAFT, WHEELS
+from css_common.sections import SPACECRAFT
 from css_environment.ephemeris import EnvironmentState
 from css_sim import disturbances, initial_conditions
 from css_sim.rigid_body import RotationState, propagate

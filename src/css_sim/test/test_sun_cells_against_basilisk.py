@@ -14,8 +14,8 @@ import pytest
 from okeefe_spacecraft import okeefe_values
 
 from css_common.attitude import mrp_to_dcm
+from css_common.mission_section import MISSION
 from css_common.random_streams import random_key
-from css_common.sections import MISSION
 from css_common.vectors import multiply
 from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_faults, cell_screen, sun_cells

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from okeefe_spacecraft import okeefe_values
 
+from css_common.mission_section import MISSION
 from css_common.random_streams import random_key
-from css_common.sections import MISSION
 from css_sensors.cells import CELLS
 from css_sim import cell_errors, cell_screen, sun_cells
 from css_sim.fault_effects import NO_FAULTS

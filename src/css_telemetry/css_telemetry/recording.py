@@ -20,8 +20,8 @@ from sensor_msgs.msg import Illuminance, Imu, MagneticField, Temperature
 from css_common.codec import codec_of
 from css_common.epochs import format_utc
 from css_common.mission_file import dump_sections
+from css_common.mission_section import name_for_files
 from css_common.progress_lines import ProgressLines
-from css_common.sections import name_for_files
 from css_common.sensor_inputs import FULL_SUN_LUX
 from css_msgs.msg import CssVoltages, SpacecraftState, WheelState
 from css_recording.bag_metadata import Topic

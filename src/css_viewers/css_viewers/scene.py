@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from css_analysis.flight_series import MODES
+from css_common.actuator_sections import WHEEL_MAX_SPEED, of_each_wheel, wheel_axes
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import Sample
 from css_common.earth import EARTH_RADIUS
 from css_common.schema import Values
-from css_common.sections import WHEEL_MAX_SPEED, of_each_wheel, wheel_axes
 from css_common.vectors import Vec3, multiply, unit, vector_of
 from css_msgs.msg import SunEstimate
 from css_sensors.cells import FIELD_OF_VIEW, FIELDS_OF_VIEW, NORMALS

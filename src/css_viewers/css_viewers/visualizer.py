@@ -6,12 +6,12 @@ from typing import Any, ClassVar
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 
+from css_common.actuator_sections import wheel_axes
 from css_common.attitude import mrp_to_quaternion
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
 from css_common.readings import Readings
 from css_common.schema import Table, Values, integer, text
-from css_common.sections import wheel_axes
 from css_common.vectors import vector_of
 from css_msgs.msg import ControlStatus, CssVoltages, SpacecraftState, SunEstimate, WheelState
 from css_sensors.cells import LARGEST_READING, NORMALS, SMALLEST_READING

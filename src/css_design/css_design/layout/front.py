@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from css_common.mission import Mission, MissionError
+from css_common.mission_section import name_for_files
 from css_common.preflight import preflight
-from css_common.sections import name_for_files
 from css_common.whole_files import write_whole
 from css_design.errors import DesignError
 from css_design.layout.heading_error import HeadingError

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from css_common.sections import name_for_files
+from css_common.mission_section import name_for_files
 from css_common.whole_files import write_whole
 from css_design.errors import DesignError
 from css_design.new_mission.items import ITEMS

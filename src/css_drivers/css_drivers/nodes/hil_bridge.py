@@ -9,12 +9,13 @@ from typing import Any, ClassVar
 import numpy as np
 from sensor_msgs.msg import Imu
 
+from css_common.actuator_sections import ROD_MAX_DIPOLE, WHEEL_MAX_TORQUE, needed_of_wheels, wheel_axes
 from css_common.codec import Sample
 from css_common.component import Component, Input, Outgoing, Output, Received, Standing
+from css_common.mission_section import PERIOD
 from css_common.readings import Readings
 from css_common.run import node_main
 from css_common.schema import Table, Values, flag, integer, real
-from css_common.sections import PERIOD, ROD_MAX_DIPOLE, WHEEL_MAX_TORQUE, needed_of_wheels, wheel_axes
 from css_common.sensor_inputs import field_input
 from css_drivers import hil_link
 from css_drivers.hil_exchange import TROUBLES, Exchange

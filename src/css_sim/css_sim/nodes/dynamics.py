@@ -6,27 +6,18 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 
+from css_common.actuator_sections import ROD_AXES, RODS_FITTED, WHEEL_AXES, WHEELS_FITTED, needed_of_wheels
 from css_common.attitude import mrp_to_quaternion
 from css_common.codec import Sample
 from css_common.component import INERTIAL, Finding, Input, Outgoing, Output, Plant, Received
 from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import typed_call
-from css_common.mission import Node
+from css_common.mission_node import Node
+from css_common.mission_section import CASE, DURATION, PERIOD, SEED
+from css_common.orbit_section import needed_of_orbit
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values, flag, integer
-from css_common.sections import (
-    CASE,
-    DURATION,
-    PERIOD,
-    ROD_AXES,
-    RODS_FITTED,
-    SEED,
-    WHEEL_AXES,
-    WHEELS_FITTED,
-    needed_of_orbit,
-    needed_of_wheels,
-)
 from css_msgs.msg import RodDipoleCommand, SpacecraftState, WheelState, WheelTorqueCommand
 from css_sim import (
     actuator_faults,

@@ -11,11 +11,11 @@ from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Finding, Input, Outgoing, Output, Received
 from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import typed_call
-from css_common.mission import Node
+from css_common.mission_node import Node
+from css_common.mission_section import CASE, SEED
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import CASE, SEED
 from css_common.vectors import vector_of
 from css_msgs.msg import SpacecraftState
 from css_sim import axis_faults, failing, gyro, latency

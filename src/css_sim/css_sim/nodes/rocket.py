@@ -8,11 +8,12 @@ import numpy as np
 from css_common.attitude import dcm_to_mrp
 from css_common.component import INERTIAL, Finding, Outgoing, Output, Plant, Received
 from css_common.kernel import typed_call
-from css_common.mission import Node
+from css_common.mission_node import Node
+from css_common.mission_section import CASE, DURATION, PERIOD, SEED
+from css_common.orbit_section import needed_of_orbit
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import CASE, DURATION, PERIOD, SEED, needed_of_orbit
 from css_environment.orbit_checks import field_findings, orbit_findings
 from css_msgs.msg import SpacecraftState
 from css_sensors.payload import needed_of_payload

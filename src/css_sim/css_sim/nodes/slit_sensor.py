@@ -10,10 +10,11 @@ from css_common.codec import Sample
 from css_common.component import INERTIAL, Component, Input, Outgoing, Output, Received
 from css_common.fault_lines import FAULTS, Units
 from css_common.kernel import typed_call
+from css_common.mission_section import CASE, PERIOD, SEED
+from css_common.orbit_section import needed_of_orbit
 from css_common.random_streams import random_key
 from css_common.run import node_main
 from css_common.schema import Values
-from css_common.sections import CASE, PERIOD, SEED, needed_of_orbit
 from css_common.vectors import Vec3, vector_of
 from css_msgs.msg import SlitPulse, SlitPulses, SpacecraftState
 from css_sensors.payload import needed_of_payload
