@@ -13,7 +13,9 @@ from css_estimation.sun.sun_heading import UNKNOWN_SKY
 
 
 @pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no rate"])
-@pytest.mark.parametrize(("normals", "view"), [(RING, 120.0), (SIX, 180.0)], ids=["ring", "six faces"])
+@pytest.mark.parametrize(
+    ("normals", "view"), [(RING, 120.0), (SIX, 180.0), (SIX[:4], 180.0)], ids=["ring", "six faces", "belt"]
+)
 def test_healthy_cells_are_not_held_for_failed(normals, view, gyro):
     body = Body(normals, view, gyro=gyro)
     assert body.fly(1500.0) == (0, pytest.approx(math.nan, nan_ok=True))

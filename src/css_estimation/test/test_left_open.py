@@ -6,7 +6,7 @@ import pytest
 
 from css_common.vectors import vector_of
 from css_estimation.sun.cell_layout import CELL
-from css_estimation.sun.left_open import mirrored, span_of, spread_along, surely_spans_space
+from css_estimation.sun.left_open import mirrored, span_of, spread_along, surely_spans_space, tell_one_sun
 
 
 def cells_of(normals):
@@ -54,3 +54,17 @@ def test_the_span_and_its_mirror_are_those_of_the_matrix(make):
         np.testing.assert_allclose(mirrored(span, vector_of(v)), (2.0 * inside - np.eye(3)) @ v, atol=1e-6)
         if surely_spans_space(cells, mask):
             assert span.rank == 3
+
+
+@pytest.mark.parametrize("make", SETS)
+def test_one_sun_is_told_by_normals_of_full_rank_among_the_cells_that_read(make):
+    rng = np.random.default_rng(11)
+    for _ in range(20):
+        normals = make(rng)
+        # a cell that would make three dimensions of them has no reading, and dark ones have
+        cells = cells_of(np.vstack([drawn(rng, 3), normals]))
+        outputs = np.concatenate([[np.nan] * 3, np.maximum(rng.uniform(-1.0, 1.0, len(normals)), 0.0)])
+        values = np.linalg.eigvalsh(normals.T @ normals)
+        assert tell_one_sun(cells, outputs) == bool(values[0] >= 1e-2 * values[-1])
+    outputs[:3] = 0.0
+    assert tell_one_sun(cells_of(np.vstack([np.eye(3), normals])), outputs)

@@ -34,3 +34,14 @@ def test_a_gyro_without_a_fault_that_is_held_for_failed_is_counted_even_where_it
     held = any(SORT_GYRO in sample.sort for sample in told)
     assert held == (bias_deg_h > 0.0)
     assert row["left_sensors"] == row["falsely_left_sensors"] == held
+
+
+@pytest.mark.parametrize("case", [1, 3])
+@pytest.mark.parametrize("gyro", [True, False], ids=["gyro", "no gyro"])
+def test_cells_in_a_plane_accuse_neither_the_gyro_nor_one_another(case, gyro):
+    """They leave two Suns, and what follows the wrong one was taken for a proof that gyro or cells are wrong."""
+    cells = "cells.normals=1,0,0,0,1,0,-1,0,0,0,-1,0", "cells.field_of_view_deg=180", "cells.clip_normal=0,0,0"
+    settings = [*cells, "mission.duration=150", f"mission.case={case}", f"sun_filter.use_gyro={str(gyro).lower()}"]
+    told = fly_and_keep(load_mission("okeefe_sun_filter", settings), ["sun_filter/sun_estimate", "health/sun_filter"])
+    assert not any(e.isolated or e.sensors_left for e in told["sun_filter/sun_estimate"])
+    assert told["health/sun_filter"] == []

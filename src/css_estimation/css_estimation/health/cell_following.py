@@ -143,9 +143,22 @@ def _light(p: CellHealthParameters, memory: CellHealthMemory, track: Track, wind
 
 @kernel
 def looked(
-    p: CellHealthParameters, memory: CellHealthMemory, track: Track, window: float, rate_sure: bool, step: int
+    p: CellHealthParameters,
+    memory: CellHealthMemory,
+    track: Track,
+    window: float,
+    rate_sure: bool,
+    one_sun: bool,
+    step: int,
 ) -> Track:
-    """The track after a look in the Sun."""
+    """The track after a look in the Sun.
+
+    Args:
+        window: [s] since the last look.
+        rate_sure: the turn since then is measured.
+        one_sun: the cells that read leave one Sun; of two, only a turn that is measured tells which cell is wrong.
+    """
+    judges = rate_sure or one_sun
     if track.phase == PHASE_LOOKING:
         return _looking(p, memory, track, window, rate_sure, step)
     # a Sun that sets, or rises, is dimmer for all alike, and not for long
@@ -170,7 +183,7 @@ def looked(
         gate = p.gate if settled else 2.0 * p.gate
         sun_b, covariance = refine(p, memory.used, sun_b, covariance, light, gate, not settled)
         light = _light(p, memory, track, window)
-    if settled:
+    if settled and judges:
         beyond = score_cells(p, memory, track, min(window, MOST_AT_ONCE), step, share, seen.support > 0 and not fades)
         # a direction that has been right for long is
         if beyond > 0 and track.calm >= _CALM_ENOUGH:
@@ -190,7 +203,7 @@ def looked(
         doubt = max(0.0, doubt - window)
     after = Track(phase, since, faded, calm, doubt, searched, sun_b, covariance, light, frame)
     if doubt > 0.0 and searched > _SEARCH_EVERY and not fades:
-        after = _searching(p, memory, after, rate_sure, step, window)
+        after = _searching(p, memory, after, rate_sure, judges, step, window)
     return after
 
 
@@ -246,13 +259,14 @@ def _searching(
     memory: CellHealthMemory,
     track: Track,
     rate_sure: bool,
+    judges: bool,
     step: int,
     window: float,
 ) -> Track:
     """A look of the search beside a direction that is followed."""
     best, sun_b = _weighed(p, memory, memory.judged, track, rate_sure)
     for i in range(memory.cells.shape[0]):
-        if memory.verdicts[i].held == 0 and memory.against[i] > _GUILTY:
+        if judges and memory.verdicts[i].held == 0 and memory.against[i] > _GUILTY:
             leave_out(p, memory, i, memory.against[i], _GUILTY, step)
         elif by_others(memory, i) and memory.against[i] < -_GUILTY:
             trust_again(memory, i)

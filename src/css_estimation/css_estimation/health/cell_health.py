@@ -47,6 +47,7 @@ from css_estimation.health.common_darkness import (
     see_light_again,
 )
 from css_estimation.health.sight import Sight
+from css_estimation.sun.left_open import tell_one_sun
 from css_estimation.sun.sun_heading import RATE_GYRO, RATE_MOMENTUM, RATE_NONE, Sky
 from css_estimation.symmetric import isotropic, trace
 
@@ -88,8 +89,6 @@ def watch_cells(
         sky: of the flight's models.
     """
     rate_known = rate_source != RATE_NONE
-    # what successive directions to the Sun make of the rate is no news of it
-    rate_sure = rate_source in (RATE_GYRO, RATE_MOMENTUM)
     rate = norm(omega_bn_b) if rate_known else 0.0
     least_change = note_outputs(p, memory, voltages, dt, rate, state.least_change)
     turn_b = add(state.turn_b, scale(dt, omega_bn_b)) if rate_known else state.turn_b
@@ -100,8 +99,12 @@ def watch_cells(
     day = lasted(state.day, dt, LATE) if sky.known and sky.illumination >= 1.0 else 0.0
     darkness = state.darkness
     if window > _LOOK or step == 1:
+        # What successive directions to the Sun make of the rate is no news of it. Where each Sun has a twin momentum
+        # goes by the Sun that is followed, and the cells do not contradict one another.
+        one_sun = tell_one_sun(p.layout.cells, memory.trusted)
+        rate_sure = rate_source == RATE_GYRO or (rate_source == RATE_MOMENTUM and one_sun)
         track = carried(track, turn_b, window, rate_sure)
-        track, darkness = _look(p, memory, track, darkness, day, window, rate_sure, step, sky, night > LATE)
+        track, darkness = _look(p, memory, track, darkness, day, window, rate_sure, one_sun, step, sky, night > LATE)
         isolated = isolated_mask(memory)
         turn_b, window = _ZERO, 0.0
     for i in range(voltages.shape[0]):
@@ -140,6 +143,7 @@ def _look(
     day: float,
     window: float,
     rate_sure: bool,
+    one_sun: bool,
     step: int,
     sky: Sky,
     night: bool,
@@ -166,7 +170,7 @@ def _look(
     if night and bright < 2:
         judge_in_the_dark(p, memory, min(window, MOST_AT_ONCE), step)
     elif top > p.minimum and (bright > 1 or not (sky.known and sky.illumination < 1.0)):
-        track = looked(p, memory, track, window, rate_sure, step)
+        track = looked(p, memory, track, window, rate_sure, one_sun, step)
     else:
         darkness = see_light_again(p, memory, darkness, window)
     judge_signals(p, memory, step)

@@ -4,7 +4,8 @@
 The direction that cells are judged by is carried along with the gyro, and one that lies takes it along; so does the
 heading of an estimator. Here the Sun line filter of O'Keefe & Schaub flies without a gyro, as it does where there is
 none, on the cells that can be trusted. It follows one Sun, and takes a dark cell for one at 90 deg from it
-(`sunline_cycle`): what it is sure of and which misfits contradict is set for that filter, not for what `ekf` adds.
+(`sunline_cycle`): what it is sure of and which misfits contradict is set for that filter, not for what `ekf` adds. Of
+cells in a plane, which leave two Suns at all times, it is sure of none.
 """
 
 import math
@@ -20,6 +21,7 @@ from css_estimation.health.rate_checks import LARGEST_UNKNOWN, RateChecks, unkno
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_cycle
 from css_estimation.sun.cell_layout import READABLE, cosine_on
+from css_estimation.sun.left_open import tell_one_sun
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_cycle import SunlineParameters, SunlineState, step_alone
@@ -164,7 +166,7 @@ def look(
     waited = state.waited + dt if lit else state.waited
     believed = lit and (found or state.found or waited > _PATIENCE)
     followed = norm(after.tracking.omega_bn_b) * dt < MOST_FOLLOWED
-    known = believed and followed and least_across(after.covariance) < _SURE
+    known = believed and followed and least_across(after.covariance) < _SURE and tell_one_sun(p.layout.cells, voltages)
     return Gyroless(after, found or state.found, waited), Glimpse(heading.sun_b, after.covariance, known)
 
 

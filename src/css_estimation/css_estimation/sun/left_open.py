@@ -111,6 +111,22 @@ def surely_spans_space(cells, mask: int) -> bool:
 
 
 @kernel
+def tell_one_sun(cells, voltages) -> bool:
+    """Whether the normals of all cells that have a reading, dark ones too, span space: else each Sun has a twin.
+
+    Args:
+        cells: (N,) with the fields nx, ny, nz.
+        voltages: (N,) outputs, NaN where there is none.
+    """
+    read = 0
+    for i in range(voltages.shape[0]):
+        # a NaN compares false
+        if abs(voltages[i]) < READABLE:
+            read |= 1 << i
+    return surely_spans_space(cells, read) or span_of(cells, read).rank == 3
+
+
+@kernel
 def mirrored(span: Span, v: Vec3) -> Vec3:
     """Mirror image of a vector in a span: what gives the cells of that span the same outputs."""
     for k in range(3):
