@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hysteresis of the cells' verdict on eclipse, and how it is joined with an orbit model's."""
 
+import numpy as np
 import pytest
 
 from css_common.schema import default_values
@@ -13,10 +14,18 @@ from css_estimation.sun.sun_heading import (
     PREDICTION_SUNLIT,
     PREDICTION_UNKNOWN,
 )
+from css_sensors.cells import CELLS
 
 
 def parameters(**changes):
     return eclipse_detector.parameters(default_values(eclipse_detector.PARAMETERS, **changes))
+
+
+def half_the_sky(**changes):
+    """One cell, which sees the half of the sky in front of it."""
+    table = eclipse_detector.PARAMETERS + CELLS
+    values = default_values(table, cells__normals=[0.0, 0.0, 1.0], cells__field_of_view_deg=180.0, **changes)
+    return eclipse_detector.parameters(values)
 
 
 def verdicts(p, outputs, predicted=PREDICTION_UNKNOWN, dt=0.5):
@@ -69,3 +78,45 @@ def test_without_a_prediction_the_cells_decide(source):
     p = parameters(eclipse__source=source)
     outputs = [0.9] * 4 + [0.0] * 30 + [0.9] * 20
     assert verdicts(p, outputs) == verdicts(parameters(), outputs)
+
+
+@pytest.mark.parametrize(
+    ("normals", "view_deg", "sees_all"),
+    [
+        (np.vstack([np.eye(3), -np.eye(3)]), 180.0, True),
+        # 54.7 deg to the corner between three faces
+        (np.vstack([np.eye(3), -np.eye(3)]), 108.0, False),
+        ([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]], 180.0, False),
+        ([[0.0, 0.0, 1.0]], 180.0, False),
+    ],
+)
+def test_which_layouts_see_all_of_the_sky(normals, view_deg, sees_all):
+    table = eclipse_detector.PARAMETERS + CELLS
+    values = default_values(table, cells__normals=np.ravel(normals).tolist(), cells__field_of_view_deg=view_deg)
+    assert eclipse_detector.parameters(values).sees_all == sees_all
+
+
+def test_cells_that_never_saw_light_and_not_all_of_the_sky_are_no_night():
+    dark = [0.0] * 100
+    assert verdicts(parameters(), dark)[-1] == ECLIPSE_ECLIPSED
+    assert ECLIPSE_ECLIPSED not in verdicts(half_the_sky(), dark)
+    # once there was light they may tell one
+    assert verdicts(half_the_sky(), [0.9, *dark])[-1] == ECLIPSE_ECLIPSED
+    assert ECLIPSE_ECLIPSED not in verdicts(half_the_sky(), [0.2, *dark])
+
+
+def test_no_night_of_theirs_is_longer_than_nights_are():
+    result = verdicts(half_the_sky(eclipse__longest=60.0), [0.9] + [0.0] * 300)
+    # 10 s of darkness begin it, at 0.5 s
+    assert result == [ECLIPSE_SUNLIT] * 21 + [ECLIPSE_ECLIPSED] * 120 + [ECLIPSE_SUNLIT] * 160
+    # after light there may be the next one
+    again = verdicts(half_the_sky(eclipse__longest=60.0), [0.9] + [0.0] * 300 + [0.9] * 20 + [0.0] * 60)
+    assert again[-1] == ECLIPSE_ECLIPSED
+
+
+def test_the_model_has_to_agree_with_cells_that_do_not_see_all_of_the_sky():
+    outputs = [0.9] + [0.0] * 100
+    assert ECLIPSE_ECLIPSED not in verdicts(half_the_sky(), outputs, PREDICTION_SUNLIT)
+    assert verdicts(half_the_sky(), outputs, PREDICTION_ECLIPSED)[-1] == ECLIPSE_ECLIPSED
+    assert verdicts(half_the_sky(eclipse__longest=5.0), outputs, PREDICTION_ECLIPSED)[-1] == ECLIPSE_ECLIPSED
+    assert verdicts(parameters(), outputs, PREDICTION_SUNLIT)[-1] == ECLIPSE_ECLIPSED

@@ -44,6 +44,17 @@ def test_the_kalman_filter_is_within_the_papers_error(cases):
     assert mean < 2.4
 
 
+@pytest.mark.parametrize("case", [6, 30])
+def test_a_spacecraft_whose_cells_look_to_one_side_finds_the_sun_behind_them(case):
+    """Four cells at 45 deg to +z, and the Sun behind the body when it has come to rest: it is no night, and it looks."""
+    normals = "0.7071068,0,0.7071068,0,0.7071068,0.7071068,-0.7071068,0,0.7071068,0,-0.7071068,0.7071068"
+    cells = f"cells.normals={normals}", "cells.clip_normal=0,0,0", "cells.field_of_view_deg=120"
+    log = fly_directly(short(*cells, f"mission.case={case}", duration=240.0))
+    cosines = log.sun_b @ np.asarray(log.array_normal_b)
+    assert np.any(cosines[:1500] < 0.0) and np.all(cosines[-100:] > np.cos(np.radians(30.0)))
+    assert np.all(log.estimates["ekf"].eclipse == SunEstimate.ECLIPSE_SUNLIT)
+
+
 def test_every_case_is_power_positive_within_three_minutes(cases):
     for run in (*cases["ekf"], *cases["wavg"]):
         assert run["flown"] and run["gyro"] == "on"
