@@ -60,7 +60,9 @@ def dipole(attitudes, dt):
 
 
 @kernel
-def _drive(p, state, memory, dt, gyro, gyro_valid, field, field_valid, sun, variance, known, misfits, speeds, out):
+def _drive(
+    p, state, memory, dt, gyro, gyro_valid, field, field_valid, sun, variance, known, misfits, speeds, used, out
+):
     for k in range(gyro.shape[0]):
         aiding = Aiding(
             (gyro[k, 0], gyro[k, 1], gyro[k, 2]),
@@ -73,7 +75,7 @@ def _drive(p, state, memory, dt, gyro, gyro_valid, field, field_valid, sun, vari
         )
         j = max(k - 1, 0)
         glimpse = glimpse_of(Sight((sun[j, 0], sun[j, 1], sun[j, 2]), variance, known[j]))
-        state, trusted = check_aiding(p, state, memory, dt, aiding, glimpse, misfits, True)
+        state, trusted = check_aiding(p, state, memory, dt, aiding, glimpse, misfits, used[k])
         bias = state.gyro.opinion.bias
         for i in range(3):
             out[k, i], out[k, 3 + i] = trusted.gyro_b[i], bias.bias_b[i]
@@ -86,7 +88,9 @@ def _drive(p, state, memory, dt, gyro, gyro_valid, field, field_valid, sun, vari
 class Judged:
     """What was made of all cycles: a row each."""
 
-    def __init__(self, p, dt, *, gyro=None, field=None, sun, sigma, known=None, misfits=True, gyro_valid=None):
+    def __init__(
+        self, p, dt, *, gyro=None, field=None, sun, sigma, known=None, misfits=True, gyro_valid=None, used=None
+    ):
         n = len(sun)
         yes, no, nothing = np.ones(n, bool), np.zeros(n, bool), np.zeros((n, 3))
         self.memory = aiding_health.initial_memory(p)
@@ -105,6 +109,7 @@ class Judged:
             yes if known is None else known,
             misfits,
             np.zeros(0),
+            yes if used is None else used,
             out,
         )
         self.rate_b, self.bias_b, self.variances = out[:, :3], out[:, 3:6], out[:, 6:9]

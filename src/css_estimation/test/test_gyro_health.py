@@ -222,3 +222,26 @@ def test_along_a_sun_line_at_rest_in_the_body_nothing_is_known():
     assert unseen_sigma(result.state.gyro, (0.0, 0.0, 1.0)) > 10.0 * known
     # and so less is said of the rate there than the gyro reads
     assert abs(result.rate_b[-1, 2]) < abs(gyro[-1, 2])
+
+
+def test_a_gyro_that_nobody_listens_to_is_not_judged():
+    """Not by its samples either, which without a time between them seemed to change faster than a body can."""
+    _, gyro, sun, _ = flight((3.0, -2.0, 4.0))
+    ramp = np.clip(DT * np.arange(COUNT) - 10.0, 0.0, 20.0)[:, np.newaxis]
+    lying = spoilt(gyro + 2.0 * DEG * ramp, 1, lambda x, t: -x, 100.0)
+    result = judged(lying, sun, used=np.zeros(COUNT, bool))
+    assert not result.left.any() and not result.gyro_held.any()
+    assert np.array_equal(result.rate_b, lying) and result.gyro_valid.all()
+
+
+def test_a_gyro_that_is_used_again_begins_with_its_first_word():
+    """What it said meanwhile is no jump, and its silence none."""
+    _, gyro, sun, _ = flight((3.0, -2.0, 4.0))
+    used = np.ones(COUNT, bool)
+    used[1000:4000] = False
+    gyro[1000:3990] += 50.0 * DEG
+    spoken = np.ones(COUNT, bool)
+    spoken[2000:3900] = False
+    result = judged(gyro, sun, used=used, gyro_valid=spoken)
+    assert not result.left.any() and not result.gyro_held.any()
+    assert np.array_equal(result.rate_b[4000:], gyro[4000:])

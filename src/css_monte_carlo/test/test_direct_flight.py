@@ -46,7 +46,7 @@ def test_the_kalman_filter_is_within_the_papers_error(cases):
 
 @pytest.mark.parametrize("case", [6, 30])
 def test_a_spacecraft_whose_cells_look_to_one_side_finds_the_sun_behind_them(case):
-    """Four cells at 45 deg to +z, and the Sun behind the body when it has come to rest: it is no night, and it looks."""
+    """Four cells at 45 deg to +z, and the Sun behind the body when it has come to rest: that is no night."""
     normals = "0.7071068,0,0.7071068,0,0.7071068,0.7071068,-0.7071068,0,0.7071068,0,-0.7071068,0.7071068"
     cells = f"cells.normals={normals}", "cells.clip_normal=0,0,0", "cells.field_of_view_deg=120"
     log = fly_directly(short(*cells, f"mission.case={case}", duration=240.0))

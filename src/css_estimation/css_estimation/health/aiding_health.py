@@ -12,7 +12,7 @@ from css_common.vectors import Vec3
 from css_estimation.health import field_health, gyro_state
 from css_estimation.health.field_health import FieldHealthParameters, FieldState, check_field
 from css_estimation.health.gyro_fit import new_fits
-from css_estimation.health.gyro_health import check_gyro
+from css_estimation.health.gyro_health import check_gyro, unheard
 from css_estimation.health.gyro_state import GyroHealthParameters, GyroState
 from css_estimation.health.gyroless_sight import Glimpse
 from css_estimation.health.rate_checks import new_axes
@@ -109,22 +109,26 @@ def check_aiding(
         aiding: as measured.
         sight: the Sun by the cells alone, of the last cycle.
         misfits: the cells contradict a Sun line that the gyro leads.
-        gyro_used: somebody listens to it; else its silence is none.
+        gyro_used: somebody listens to it; else nobody asks whether it is right.
     """
     step = state.step + 1
-    gyro, gyro_b, gyro_valid, gyro_left = check_gyro(
-        p.gyro,
-        state.gyro,
-        memory.axes,
-        memory.fits,
-        memory.gyro_verdicts,
-        dt if gyro_used else 0.0,
-        step,
-        aiding.gyro_b,
-        aiding.gyro_valid,
-        sight,
-        misfits,
-    )
+    gyro, gyro_b, gyro_valid, gyro_left = state.gyro, aiding.gyro_b, aiding.gyro_valid, False
+    if not gyro_used:
+        gyro = unheard(gyro, memory.axes)
+    else:
+        gyro, gyro_b, gyro_valid, gyro_left = check_gyro(
+            p.gyro,
+            gyro,
+            memory.axes,
+            memory.fits,
+            memory.gyro_verdicts,
+            dt,
+            step,
+            gyro_b,
+            gyro_valid,
+            sight,
+            misfits,
+        )
     field, field_b, field_valid, field_left = check_field(
         p.field,
         state.field,

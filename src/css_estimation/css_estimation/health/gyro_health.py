@@ -87,6 +87,20 @@ def _compare_with_sun(
 
 
 @kernel
+def unheard(state: GyroState, axes) -> GyroState:
+    """A cycle in which nobody listens to the gyro: nothing is judged, and what it says next is its first word.
+
+    Args:
+        axes: (3,) of GYRO_AXIS, advanced.
+    """
+    r = state.readings
+    if r.spoken:
+        for i in range(3):
+            forget_samples(axes[i])
+    return GyroState(Readings(r.rate_b, r.before_b, 0.0, False, 0.0), state.opinion, interrupted(state.sight))
+
+
+@kernel
 def check_gyro(
     p: GyroHealthParameters,
     state: GyroState,

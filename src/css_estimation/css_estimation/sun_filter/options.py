@@ -178,6 +178,26 @@ class CellErrors(NamedTuple):
     )
 
 
+UNKNOWN_HEADING = real(
+    "albedo.unknown_heading_deg",
+    1.5,
+    "deg",
+    "error of the Sun's height over a cell with a view of 120 deg by lasting light of an Earth that is not predicted; "
+    "three times that with one of 180 deg",
+    low=0.0,
+    high=45.0,
+)
+
+
+def _unknown_heading(values: Values) -> float:
+    """What the lasting light of an unknown Earth does, squared [rad2]: more on cells that see more of it.
+
+    Flights of box and pyramids with cones of 120, 150 and 180 deg about the normals have errors of that size.
+    """
+    wide = min(max(3.0 - 4.0 * half_view_cosine(values), 1.0), 3.0)
+    return (wide * math.radians(values[UNKNOWN_HEADING])) ** 2
+
+
 class EarthErrors(NamedTuple):
     """How the real Earth differs from the mean one."""
 
@@ -209,17 +229,7 @@ class EarthErrors(NamedTuple):
             "albedo.largest", 0.3, "-", "light beyond the predicted that no Earth throws on a cell", low=0.01, high=2.0
         )
     )
-    unknown_heading: float = made(
-        lambda degrees: math.radians(degrees) ** 2,
-        real(
-            "albedo.unknown_heading_deg",
-            1.5,
-            "deg",
-            "error of the Sun's height over a cell by lasting light of an Earth that is not predicted",
-            low=0.0,
-            high=45.0,
-        ),
-    )
+    unknown_heading: float = computed(_unknown_heading, UNKNOWN_HEADING)  # [rad2]
 
 
 class Motion(NamedTuple):
