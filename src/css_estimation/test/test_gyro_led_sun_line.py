@@ -12,7 +12,17 @@ from css_common.attitude import rotation_vector_to_dcm
 from css_common.declared import builder
 from css_common.vectors import unit, vector_of
 from css_estimation.health.cell_options import CellHealthParameters
-from css_estimation.health.gyroless_sight import Glimpse, contradicts, follow_gyro, gyro_led_parameters, initial_led
+from css_estimation.health.gyroless_sight import (
+    Glimpse,
+    contradicts,
+    follow_gyro,
+    gyro_led_parameters,
+    gyroless_parameters,
+    initial_led,
+    initial_state,
+    look,
+)
+from css_estimation.health.rate_checks import RateChecks
 from css_estimation.nodes.ekf import Ekf
 from css_estimation.sun.sun_heading import UNKNOWN_SKY
 
@@ -85,3 +95,27 @@ def test_a_gyro_that_lies_is_contradicted():
         assert not flight.contradicted
         flight.fly(60.0, error=math.radians(3.0) * across / np.linalg.norm(across))
         assert flight.contradicted
+
+
+FACES = np.vstack([np.eye(3), -np.eye(3)])
+
+
+@pytest.mark.parametrize("missing", [(), (5,), (3, 4, 5)], ids=["six faces", "five", "three"])
+def test_a_sight_without_gyro_that_is_known_is_right_also_where_no_cell_looks(missing):
+    """A dark cell is one at 90 deg from the Sun only where the one behind it would be lit beyond."""
+    normals = np.delete(FACES, missing, axis=0)
+    cells = {"cells__normals": normals.ravel().tolist(), "cells__field_of_view_deg": 180.0}
+    values = okeefe_values(Ekf.table(), **cells, cells__clip_normal=[0.0, 0.0, 0.0])
+    p, checks = gyroless_parameters(values), builder(RateChecks)(values)
+    state, shown, worst, outputs = initial_state(p), 0, 0.0, np.zeros(len(normals))
+    sun_b, turn = np.array(unit((0.5, 0.6, 0.6))), np.array(rotation_vector_to_dcm((0.001, -0.0015, 0.002)))
+    for _ in range(8000):
+        sun_b = turn @ sun_b
+        ideal_outputs(p.layout, tuple(sun_b), False, 1.0, outputs)
+        told = tuple(sun_b.tolist())
+        state, sight = look(p, checks, state, DT, outputs, NO_SPEEDS, UNKNOWN_SKY, outputs.max() > 0.1, told)
+        if sight.known:
+            shown += 1
+            worst = max(worst, math.degrees(math.acos(min(1.0, float(sun_b @ sight.sun_b)))))
+    assert shown > 500
+    assert worst < 10.0

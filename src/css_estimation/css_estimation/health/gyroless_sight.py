@@ -21,7 +21,7 @@ from css_estimation.health.rate_checks import LARGEST_UNKNOWN, RateChecks, unkno
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_cycle
 from css_estimation.sun.cell_layout import READABLE, cosine_on
-from css_estimation.sun.left_open import tell_one_sun
+from css_estimation.sun.left_open import span_of, surely_spans_space, tell_one_sun
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_cycle import SunlineParameters, SunlineState, step_alone
@@ -43,6 +43,7 @@ _PATIENCE = 30.0  # [s] of light
 MOST_FOLLOWED = 0.5
 """Turn [rad] of a body between two looks that a filter without a gyro follows: what cells say is linear in less."""
 _ALONG = 1e-4  # [rad^2] along the Sun line
+_NO_EARTH = 0.3  # [-] more than the Earth gives a cell
 _NO_RATE = (0.0, 0.0, 0.0)
 
 
@@ -129,6 +130,23 @@ def _stepped(
 
 
 @kernel
+def _shows_the_sun(p: SunlineParameters, voltages) -> bool:
+    """Whether what the cells see is the Sun, and one Sun.
+
+    Cells that see all of the sky do so together, dark ones too. Else a dark one says nothing of how far the Sun is
+    beyond its edge, and bright ones alone, brighter than the Earth makes them, have to span space.
+    """
+    if p.tracking.eclipse.sees_all:
+        return tell_one_sun(p.layout.cells, voltages)
+    bright = 0
+    for i in range(voltages.shape[0]):
+        # a NaN compares false
+        if _NO_EARTH < voltages[i] < READABLE:
+            bright |= 1 << i
+    return surely_spans_space(p.layout.cells, bright) or span_of(p.layout.cells, bright).rank == 3
+
+
+@kernel
 def look(
     p: SunlineParameters,
     checks: RateChecks,
@@ -166,7 +184,7 @@ def look(
     waited = state.waited + dt if lit else state.waited
     believed = lit and (found or state.found or waited > _PATIENCE)
     followed = norm(after.tracking.omega_bn_b) * dt < MOST_FOLLOWED
-    known = believed and followed and least_across(after.covariance) < _SURE and tell_one_sun(p.layout.cells, voltages)
+    known = believed and followed and least_across(after.covariance) < _SURE and _shows_the_sun(p, voltages)
     return Gyroless(after, found or state.found, waited), Glimpse(heading.sun_b, after.covariance, known)
 
 
