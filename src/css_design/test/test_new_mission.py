@@ -53,6 +53,19 @@ def test_six_faces_acquire_the_sun(template, tmp_path):
     assert np.all(acquired < 600.0) and np.all(pointing < 30.0), (acquired, pointing)
 
 
+def test_the_estimator_is_told_what_healthy_sensors_read():
+    """Of a body that its wheels turn up by 8.6 deg/s^2, with a gyro of 0.2 deg/s and cells of 10 %."""
+    given = {"gyro": "0.2", "gyro_bias": "720", "cell_noise": "0.03", "cell_scale": "0.1", "magnetometer": "900"}
+    mission = made("3u", wheels="3", wheel_torque="0.001", rods="none", **given).mission
+    health = mission.node("sun_filter").values.health
+    assert health.gyro.noise_deg_s == 0.2 and health.gyro.bias_deg_s == 0.2 and health.field.noise_nt == 900.0
+    assert (health.cells.noise, health.cells.share) == (0.03, 0.1)
+    moments = np.diag(np.asarray(mission.values.spacecraft.inertia))
+    assert health.gyro.acceleration_deg_s2 == pytest.approx(1.5 * math.degrees(0.001 / moments.min()), rel=1e-3)
+    # what a quiet and slow one reads is as usual
+    assert "health" not in made("smallsat", cell_scale="0.01", wheel_torque="0.005").text
+
+
 def test_a_spacecraft_without_gyro_or_wheels_gets_what_it_needs():
     rods = made("3u-rods")
     names = {node.name for node in rods.mission.nodes}

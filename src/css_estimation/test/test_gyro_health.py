@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 from sensor_truth import DEG, Judged, parameters, seen, tumble
 
+from css_common.actuator_sections import WHEELS
+from css_common.declared import built, table_of
 from css_common.health import (
     KIND_BIAS,
     KIND_DEAD,
@@ -16,10 +18,14 @@ from css_common.health import (
     KIND_SILENT,
     KIND_STUCK,
 )
+from css_common.schema import default_values
+from css_common.sections import SPACECRAFT
 from css_estimation.health.gyro_state import GYRO_CORRECTED, GYRO_LEFT, GYRO_TRUSTED, unseen_sigma
+from css_estimation.health.rate_checks import RateChecks
 from css_estimation.sun.sun_heading import LEFT_GYRO
 
 P = parameters()
+CHECKS = table_of(RateChecks)
 DT, COUNT = 0.1, 6000
 SIGHT = 0.5 * DEG
 NOISE = 0.01 * DEG
@@ -245,3 +251,17 @@ def test_a_gyro_that_is_used_again_begins_with_its_first_word():
     result = judged(gyro, sun, used=used, gyro_valid=spoken)
     assert not result.left.any() and not result.gyro_held.any()
     assert np.array_equal(result.rate_b[4000:], gyro[4000:])
+
+
+def test_wheels_may_turn_a_small_body_up_by_as_much_as_they_can():
+    """Three of 1 mN m and a smallest moment of 0.005 kg m^2: 11.5 deg/s^2."""
+    given = {
+        "spacecraft__inertia": np.diag([0.02, 0.02, 0.005]).ravel().tolist(),
+        "wheels__axes": np.eye(3).ravel().tolist(),
+        "wheels__max_torque": 0.001,
+    }
+    values = default_values(SPACECRAFT + WHEELS + CHECKS, **given)
+    assert built(RateChecks, values).acceleration == pytest.approx(0.2, rel=1e-12)
+    assert built(RateChecks, default_values(CHECKS)).acceleration == pytest.approx(DEG)
+    bare = default_values(SPACECRAFT + WHEELS + CHECKS, **given, wheels__fitted=False)
+    assert built(RateChecks, bare).acceleration == pytest.approx(DEG)

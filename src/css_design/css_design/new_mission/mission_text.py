@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from css_design.new_mission.commented import Entry, parameter_file
 from css_design.new_mission.design import Design
+from css_design.new_mission.healthy_readings import healthy_readings
 
 _NOTHING = 1e-6  # gains of a control that is asked for its model alone
 _DARK = 0.12  # [-] output below which estimators take it for dark, unless the cells' noise asks for more
@@ -179,6 +180,7 @@ def _estimator(design: Design) -> Iterator[Entry]:
         yield Entry("use_gyro", False)
     if asked["gyro"] is None and asked["magnetometer"] is not None and name not in ("sun_filter",):
         yield Entry("rate.use_field", bool(len(design.wheel_axes)), "the rate about the Sun line, from the field")
+    yield from healthy_readings(design)
     floor = round(_NOISES * noise, 4)
     # below these a cell may be lit by its noise alone
     yield Entry("eclipse.dark_level", max(_DARK, floor), "[computed] brightest cell below which it is dark")

@@ -19,10 +19,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from css_common.actuator_sections import WHEEL_MAX_TORQUE, WHEELS_FITTED, of_each_wheel, wheel_axes
 from css_common.declared import computed, given, made, table_of
 from css_common.kernel import kernel
+from css_common.matrices import inverse
 from css_common.normal_distribution import normal_share
-from css_common.schema import real
+from css_common.schema import Values, real
+from css_common.sections import INERTIA
+from css_common.vectors import mat3
 
 _FALSE_ALARM = 1e-9  # of one run of samples
 _LOG_FALSE_ALARM = math.log(_FALSE_ALARM)
@@ -104,6 +108,28 @@ def equal_count(noise: float, resolution: float) -> int:
     return max(rounding_run.py_func(noise, resolution), _FEWEST_EQUAL)
 
 
+ACCELERATION = real(
+    "health.gyro.acceleration_deg_s2",
+    1.0,
+    "deg/s^2",
+    "largest angular acceleration by actuators, or by all wheels where they and the inertia are known, if that is more",
+    low=0.0,
+    high=1e4,
+)
+
+
+def _acceleration(values: Values) -> float:
+    """Largest angular acceleration by what is said, and by all wheels together [rad/s2]."""
+    said = math.radians(values[ACCELERATION])
+    if INERTIA not in values or WHEELS_FITTED not in values or not len(values[INERTIA]):
+        return said
+    torques = np.einsum(
+        "n,ni->i", of_each_wheel(values, WHEEL_MAX_TORQUE)[: len(wheel_axes(values))], abs(wheel_axes(values))
+    )
+    by_wheels = np.einsum("ij,j->i", abs(np.array(inverse(mat3(values[INERTIA])))), np.nan_to_num(torques))
+    return max(said, float(np.max(by_wheels)))
+
+
 class RateChecks(NamedTuple):
     """Rates in rad/s."""
 
@@ -120,17 +146,7 @@ class RateChecks(NamedTuple):
     )
     largest_change: float = computed(lambda values: gamma_quantile(DEGREES_OF_FREEDOM, _SIGMAS))
     equal: int = made(equal_count, NOISE, RESOLUTION)
-    acceleration: float = made(  # [rad/s2]
-        math.radians,
-        real(
-            "health.gyro.acceleration_deg_s2",
-            1.0,
-            "deg/s^2",
-            "largest angular acceleration by actuators",
-            low=0.0,
-            high=1e4,
-        ),
-    )
+    acceleration: float = computed(_acceleration, ACCELERATION)  # [rad/s2]
     patience: float = given(
         real("health.gyro.patience", 1.0, "s", "without a number for longer an axis fails", low=0.0, high=1e4)
     )
