@@ -12,7 +12,7 @@ import pytest
 from listing import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
-from mutants import draw, recall
+from mutants import EQUIVALENT, draw, recall
 from mutations import mutations
 from relevant_tests import Sources
 
@@ -82,6 +82,12 @@ def test_mutants_are_found_again_by_their_names():
     names = [mutant.name for mutant in draw(ROOT, 1, 30)]
     gone = ["src/css_sim/css_sim/gyro.py: no such line -> pass", "src/css_sim/css_sim/no_such_file.py: a -> pass"]
     assert sorted(mutant.name for mutant in recall(ROOT, [*names, *gone])) == sorted(names)
+
+
+def test_mutants_listed_as_equivalent_are_of_the_sources_as_they_are_and_say_why():
+    listed = {entry["mutant"]: entry["reason"] for entry in json.loads(EQUIVALENT.read_text(encoding="utf-8"))}
+    assert {mutant.name for mutant in recall(ROOT, listed)} == set(listed)
+    assert all(reason.strip() for reason in listed.values())
 
 
 def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sources):
