@@ -8,8 +8,12 @@ from pathlib import Path
 
 # This module imports what missions name: whoever loads a mission may run any node.
 _LOADER = "css_common.node_files"
+# They run what is installed with ROS against what is laid out without: with a mutant on both sides.
+_LEFT_OUT = ("test_without_ros.py",)
 # This module imports the paper that it is asked for.
 _PAPERS = "css_papers.papers"
+# This module draws every figure of the documentation.
+_FIGURES = "css_docs.figure_files"
 # Whoever knows the verbs starts their executables.
 _VERBS = "bootstrap.verbs"
 
@@ -23,7 +27,7 @@ class Sources:
         self.modules = {_module(root, file): file for file in files if file.relative_to(root).parts[2] != "launch"}
         tests = [*sorted(root.glob("src/*/test/*.py")), *sorted(root.glob("tests/*.py"))]
         self.helpers = {file.stem: file for file in tests if not file.name.startswith("test_")}
-        self.tests = [file for file in tests if file.name.startswith("test_")]
+        self.tests = [file for file in tests if file.name.startswith("test_") and file.name not in _LEFT_OUT]
 
     def seen_by(self, mutated: Path, beyond: int) -> tuple[list[Path], list[Path]]:
         """Test files of the package of a source file that see it, and at most `beyond` others, both nearest first."""
@@ -65,6 +69,8 @@ class Sources:
             found += [source for name, source in self.modules.items() if ".nodes." in name]
         if self.modules.get(_PAPERS) == file:
             found += [source for name, source in self.modules.items() if name.endswith(".paper")]
+        if self.modules.get(_FIGURES) == file:
+            found += [source for name, source in self.modules.items() if ".figures." in name]
         if _VERBS in names:
             found += [source for name, source in self.modules.items() if ".commands." in name]
         return tuple(found)

@@ -107,6 +107,9 @@ def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sou
     assert ROOT / "src/css_bringup/test/test_bringup_requests.py" in own
     own, _ = sources.seen_by(ROOT / "src/css_papers/css_papers/digregorio/figures.py", 0)
     assert ROOT / "src/css_papers/test/test_digregorio_page.py" in own
+    # a figure of the documentation by what draws them all
+    own, _ = sources.seen_by(ROOT / "src/css_docs/css_docs/figures/triad.py", 0)
+    assert own[0] == ROOT / "src/css_docs/test/test_figures.py"
 
 
 FAILING = """
