@@ -34,8 +34,15 @@ class Sources:
         distances = {test: self._distance(test, mutated) for test in self.tests}
         known = [test for test in self.tests if distances[test] is not None]
         package, across = self.root / "src" / mutated.relative_to(self.root).parts[1], self.root / "tests"
-        # at the same distance those that fly several packages together come before those of another package
-        known.sort(key=lambda test: (distances[test], not test.is_relative_to(across), test.parts))
+        words = set(mutated.stem.split("_"))
+
+        def order(test: Path) -> tuple[object, ...]:
+            # at the same distance those that fly several packages together come before those of another package, and
+            # those that are named alike before all that need the module by the way
+            alike = len(words & set(test.stem.split("_")))
+            return distances[test], not test.is_relative_to(across), -alike, test.parts
+
+        known.sort(key=order)
         own = [test for test in known if test.is_relative_to(package)]
         return own, [test for test in known if test not in own][:beyond]
 
@@ -63,6 +70,12 @@ class Sources:
                 names.update(f"{node.module}.{alias.name}" for alias in node.names)
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 names.add(node.value)  # a module that is imported by its name, when it is needed
+            elif isinstance(node, ast.Call):
+                # an executable that is started, by package and name
+                values = (argument.value for argument in node.args[:2] if isinstance(argument, ast.Constant))
+                named = [value for value in values if isinstance(value, str)]
+                if len(named) == 2:
+                    names.update((f"{named[0]}.commands.{named[1]}", f"{named[0]}.nodes.{named[1]}"))
         found = [self.modules[name] for name in sorted(names) if name in self.modules]
         found += [self.helpers[name] for name in sorted(names) if name in self.helpers]
         if self.modules.get(_LOADER) == file:
