@@ -10,6 +10,8 @@ from pathlib import Path
 _LOADER = "css_common.node_files"
 # They run what is installed with ROS against what is laid out without: with a mutant on both sides.
 _LEFT_OUT = ("test_without_ros.py",)
+# They look at the parameters and the options of all packages, in a second.
+_OF_ALL = ("test_parameter_limits.py", "test_option_ranges.py")
 # This module imports the paper that it is asked for.
 _PAPERS = "css_papers.papers"
 # This module draws every figure of the documentation.
@@ -30,7 +32,10 @@ class Sources:
         self.tests = [file for file in tests if file.name.startswith("test_") and file.name not in _LEFT_OUT]
 
     def seen_by(self, mutated: Path, beyond: int) -> tuple[list[Path], list[Path]]:
-        """Test files of the package of a source file that see it, and at most `beyond` others, both nearest first."""
+        """Test files of the package of a source file that see it, and at most `beyond` others, both nearest first.
+
+        What looks at all packages comes before those others, and does not count.
+        """
         distances = {test: self._distance(test, mutated) for test in self.tests}
         known = [test for test in self.tests if distances[test] is not None]
         package, across = self.root / "src" / mutated.relative_to(self.root).parts[1], self.root / "tests"
@@ -44,7 +49,8 @@ class Sources:
 
         known.sort(key=order)
         own = [test for test in known if test.is_relative_to(package)]
-        return own, [test for test in known if test not in own][:beyond]
+        of_all = [test for test in known if test.name in _OF_ALL]
+        return own, [*of_all, *[test for test in known if test not in (*own, *of_all)][:beyond]]
 
     def _distance(self, test: Path, mutated: Path) -> int | None:
         """Imports from a test file to a source file; None: no way leads there."""
