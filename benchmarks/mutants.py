@@ -13,7 +13,7 @@ line is one JSON object. Survivors that do the same as the original, or that no 
 `equivalent_mutants.json`, with the reason, and do not count. A draw is that of the sources as they are: once they have
 changed, `--known` judges the mutants of the file again instead of others.
 
-    ./sunpoint shell -c "python benchmarks/mutants.py --count 200 --seed 1 --minutes 120"
+    ./sunpoint shell -c "python benchmarks/mutants.py --quick --count 200 --seed 1 --minutes 120"
     ./sunpoint shell -c "python benchmarks/mutants.py --known --again survived"
 """
 
@@ -109,8 +109,9 @@ def recall(root: Path, names: Iterable[str]) -> Iterator[Mutant]:
 class Trial:
     """A copy of the project in which mutants are tested."""
 
-    def __init__(self, root: Path, copy: Path, seconds: float, beyond: int) -> None:
-        self._root, self._copy, self._seconds, self._beyond = root, copy, seconds, beyond
+    def __init__(self, root: Path, copy: Path, options: argparse.Namespace) -> None:
+        self._root, self._copy, self._seconds, self._beyond = root, copy, options.seconds, options.beyond
+        self._chosen = ("-m", "not long") if options.quick else ()
         for name in COPIED:
             if (root / name).is_dir():
                 shutil.copytree(root / name, copy / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
@@ -192,7 +193,7 @@ class Trial:
         progress.unlink(missing_ok=True)
         broken = {*left_out, *(test for test, sound in self._sound.items() if not sound)}
         names = [str(file.relative_to(self._copy)) if isinstance(file, Path) else file for file in files]
-        command = [*_PYTEST, "-x", "--tb=no"]
+        command = [*_PYTEST, *self._chosen, "-x", "--tb=no"]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         process = subprocess.Popen(
             [*command, *(f"--deselect={test}" for test in sorted(broken)), *names],
@@ -258,7 +259,7 @@ def tested(options: argparse.Namespace, known: dict[str, dict[str, Any]]) -> Ite
             if verdict is None or (verdict["verdict"] in options.again and mutant.name not in equal):
                 if time.monotonic() > end:
                     continue
-                trial = trial or Trial(ROOT, Path(folder) / "project", options.seconds, options.beyond)
+                trial = trial or Trial(ROOT, Path(folder) / "project", options)
                 verdict = {"mutant": mutant.name, "kind": mutant.mutation.kind, **trial.test(mutant)}
                 with options.verdicts.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(verdict) + "\n")
@@ -313,6 +314,9 @@ def main() -> int:
     )
     parser.add_argument(
         "--beyond", type=int, default=4, metavar="N", help="test files of other packages (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="without the longest tests; what survives is to be judged again with them"
     )
     parser.add_argument(
         "--again", action="append", default=[], choices=(SURVIVED, OPEN, KILLED), help="test those once more"

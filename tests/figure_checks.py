@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every figure must have: names of all axes, and letters that can be read on what is behind them."""
+"""What every figure must have: a title in its file, names of all axes, letters that can be read on what is behind."""
 
 from collections.abc import Iterator
 
@@ -19,6 +19,8 @@ def checked_figures(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
     def checked(figure: Figure, path, **options) -> None:
         faults.extend(f"{path}: {fault}" for fault in figure_faults(figure))
+        if not any(map(_title, figure.axes)) and not figure.get_suptitle():
+            faults.append(f"{path}: no title")  # whoever finds the file has no caption
         savefig(figure, path, **options)
 
     monkeypatch.setattr(Figure, "savefig", checked)

@@ -12,7 +12,7 @@ import pytest
 from listing import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
-from mutants import draw, recall
+from mutants import EQUIVALENT, draw, recall
 from mutations import mutations
 from relevant_tests import Sources
 
@@ -84,12 +84,19 @@ def test_mutants_are_found_again_by_their_names():
     assert sorted(mutant.name for mutant in recall(ROOT, [*names, *gone])) == sorted(names)
 
 
+def test_mutants_listed_as_equivalent_are_of_the_sources_as_they_are_and_say_why():
+    listed = {entry["mutant"]: entry["reason"] for entry in json.loads(EQUIVALENT.read_text(encoding="utf-8"))}
+    assert {mutant.name for mutant in recall(ROOT, listed)} == set(listed)
+    assert all(reason.strip() for reason in listed.values())
+
+
 def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sources):
     own, others = sources.seen_by(ROOT / "src/css_sim/css_sim/gyro.py", 3)
     names = [test.name for test in own]
     assert {"test_gyro_and_magnetometer_statistics.py", "test_draws_are_independent.py"} <= set(names[:3])
     assert "test_simulation_components.py" in names[:4] and "test_rigid_body_against_closed_forms.py" not in names
-    assert len(others) == 3 and not any("css_sim" in test.parts for test in others)
+    assert len(others) == 2 + 3 and not any("css_sim" in test.parts for test in others)
+    assert {test.name for test in others[:2]} == {"test_option_ranges.py", "test_parameter_limits.py"}
     # a node file is imported by what loads missions
     _, others = sources.seen_by(ROOT / "src/css_estimation/css_estimation/nodes/coning.py", 50)
     assert ROOT / "tests/test_components.py" in others
@@ -101,6 +108,9 @@ def test_the_nearest_tests_come_first_and_those_of_the_package_before_others(sou
     assert ROOT / "src/css_bringup/test/test_bringup_requests.py" in own
     own, _ = sources.seen_by(ROOT / "src/css_papers/css_papers/digregorio/figures.py", 0)
     assert ROOT / "src/css_papers/test/test_digregorio_page.py" in own
+    # a figure of the documentation by what draws them all
+    own, _ = sources.seen_by(ROOT / "src/css_docs/css_docs/figures/triad.py", 0)
+    assert own[0] == ROOT / "src/css_docs/test/test_figures.py"
 
 
 FAILING = """

@@ -174,3 +174,23 @@ def test_every_cell_lost_is_every_estimate_lost_and_exit_code_1(tmp_path, capsys
     assert code == 1
     assert result["rejected"]["/css/voltages"] == {"not_finite": ESTIMATES}
     assert "no estimate from wavg" in errors
+
+
+@pytest.mark.parametrize(("epoch", "age"), [("13132.00000000", "20.0 days"), ("13151.00000000", "")])
+def test_an_element_set_of_another_time_is_said_of_each_estimator(tmp_path, capsys, epoch, age):
+    lines = (
+        f"1 25544U 98067A   {epoch}  .00002182  00000-0  46000-4 0  999",
+        "2 25544  51.6400 100.0000 0001000  90.0000 270.0000 15.5000000000000",
+    )
+    sums = [sum(int(c) if c.isdigit() else c == "-" for c in line) % 10 for line in lines]
+    given = [f"orbit.tle_line{i + 1}={line}{check}" for i, (line, check) in enumerate(zip(lines, sums, strict=True))]
+    code = command.main(
+        [str(REFERENCE), "--out", str(tmp_path / "replayed"), "--estimators", "wavg:eclipse.source=model", "ekf"]
+        + [argument for value in ("orbit.source=tle", *given) for argument in ("--set", value)]
+    )
+    said = " ".join("".join(capsys.readouterr()).split())
+    assert code == 0
+    for name in ("wavg_eclipse_source_model", "ekf"):
+        noted = f"{name}: orbit.tle_line1: the set of 2013-05-12T00:00 is used up to {age} after its epoch"
+        assert (noted in said) is bool(age)
+    assert age or "tle_line1" not in said

@@ -57,3 +57,53 @@ def test_the_line_of_a_microsecond_is_where_it_says(tmp_path, figures):
     points, line = axes.lines
     np.testing.assert_allclose(points.get_ydata(), [200.0, 0.3])
     assert set(line.get_ydata()) == {1.0} and "1 us" in [text.get_text() for text in axes.texts]
+
+
+def passages_of(frequency_hz, full_angle_deg, spin_hz=5.45):
+    """Sun angles that swing by a full angle, one a turn for a minute."""
+    time = 10.0 + np.arange(0.0, 60.0, 1.0 / spin_hz)
+    angle = 0.4 + np.radians(0.5 * full_angle_deg) * np.sin(2.0 * np.pi * frequency_hz * time)
+    zero = np.zeros_like(time)
+    return Passages(time, angle, zero, zero, zero, zero)
+
+
+def test_the_coning_angle_and_what_windows_make_of_it_are_where_they_are(tmp_path, figures):
+    windows: Any = {
+        "before": SimpleNamespace(start=20.0, end=40.0, full_angle=np.radians(12.0), max_min_angle=np.radians(10.0)),
+        "after": SimpleNamespace(start=50.0, end=60.0, full_angle=np.radians(8.0), max_min_angle=np.radians(7.0)),
+    }
+    spin_figures.write_coning_figure(passages_of(0.1, 10.0), windows, tmp_path / "coning.png", start=20.0)
+    (axes,) = figures[0].axes
+    (differences,) = axes.lines
+    assert differences.get_xdata().min() > 20.0 and axes.get_ylim()[0] == 0.0
+    np.testing.assert_allclose(differences.get_ydata(), 10.0, rtol=0.02)
+    drawn = {lines.get_label(): lines.get_segments()[0].tolist() for lines in axes.collections}
+    for name, window in windows.items():
+        for angle, what in ((window.full_angle, "motion fitted"), (window.max_min_angle, "mean of max - min")):
+            expected = [[window.start, np.degrees(angle)], [window.end, np.degrees(angle)]]
+            np.testing.assert_allclose(drawn.pop(f"{name}: {what}"), expected)
+    assert drawn == {} and axes.get_legend() is not None
+
+
+def test_the_spectrum_has_its_peak_and_its_mirror_and_names_the_candidates(tmp_path, figures):
+    chosen, mirror = SimpleNamespace(frequency=1.63), SimpleNamespace(frequency=5.45 - 1.63)
+    beyond = SimpleNamespace(frequency=5.45 + 1.63)
+    windows: Any = {"all": SimpleNamespace(start=10.0, end=70.0, candidates=[mirror, chosen, beyond], chosen=1)}
+    spin_figures.write_spectrum_figure(passages_of(1.63, 10.0), windows, tmp_path / "spectrum.png")
+    (axes,) = figures[0].axes
+    curve, half = axes.lines
+    frequency, amplitude = (np.asarray(v) for v in curve.get_data())
+    assert half.get_xdata()[0] == pytest.approx(0.5 * 5.45, rel=1e-3)
+    for low, peak in ((0.0, 1.63), (half.get_xdata()[0], 5.45 - 1.63)):
+        part = (frequency >= low) & (frequency <= low + half.get_xdata()[0])
+        assert frequency[part][np.argmax(amplitude[part])] == pytest.approx(peak, abs=0.01)
+        assert amplitude[part].max() == pytest.approx(5.0, rel=0.02)
+    named = {text.get_text(): text.xy[0] for text in axes.texts}
+    assert named == {f"{1.0 / 3.82:.4f} s": 5.45 - 1.63, f"{1.0 / 1.63:.4f} s, chosen": 1.63}
+    assert axes.get_ylim() == pytest.approx((0.0, 1.25 * amplitude.max()))
+
+
+def test_rates_and_angles_are_drawn_in_hertz_and_degrees(axes):
+    above, below = axes
+    assert np.asarray(above.lines[0].get_ydata())[0] == pytest.approx(6.0, abs=0.31)
+    assert np.ptp(np.asarray(below.lines[0].get_ydata())) == pytest.approx(np.degrees(0.2), rel=0.02)

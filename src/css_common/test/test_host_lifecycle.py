@@ -104,10 +104,12 @@ def test_wrong_requests_in_every_state_change_nothing(bench, mission):
     assert state(bench) == "active"
     node.trigger_shutdown()
     assert state(bench) == "finalized"
+    refused = node.counters["lifecycle_refused"]
+    assert refused == 2  # labels that do not exist are answered without the node
     for transition in range(1, 8):
         assert not change(bench, transition)
     assert state(bench) == "finalized"
-    assert node.counters["lifecycle_refused"] > 0
+    assert node.counters["lifecycle_refused"] == refused + 7
 
 
 def test_labels_work_as_ids_do(bench, mission):
@@ -166,6 +168,8 @@ def test_deactivated_node_is_silent_and_begins_anew(bench, mission):
     bench.until(lambda: len(estimates) == 4, "four estimates")
     assert [(e.stamp_ns - T0) // STEP for e in estimates] == [0, 1, 2, 3]
     assert [e.nis for e in estimates] == [1.0, 2.0, 1.0, 2.0]
+    # the activation at the start is none after a pause
+    assert (node.counters["deactivated"], node.counters["reactivated"]) == (1, 1)
 
 
 def test_node_that_nothing_waits_for_leaves_out_what_came_while_it_was_off(bench, mission):

@@ -97,6 +97,40 @@ def test_numbers_of_the_file_are_those_asked_for(tmp_path):
     assert "[assumed]" not in text.split("max_speed_rpm:")[1].splitlines()[0]
 
 
+@pytest.mark.parametrize("estimator", ["sun_filter", "ekf", "wls", "wavg"])
+def test_an_estimator_expects_the_cells_and_sensors_that_were_asked_for(estimator):
+    given = {"cell_noise": "0.03", "cell_bits": "6", "cell_scale": "0.05", "cell_tilt": "2", "tip_off": "3",
+             "gyro": "0.02", "gyro_bias": "5", "magnetometer": "150"}  # fmt: skip
+    mission = made("3u", estimator=estimator, **given).mission
+    cells, values = mission.node("css_array").values, mission.node(estimator).values
+    assert (cells.noise, cells.bits, cells.scale_cell_error, cells.misalignment_deg) == (0.03, 6, 0.05, 2.0)
+    assert (cells.output_high, cells.warp, cells.degradation) == (2.0, False, 0.0)
+    if estimator in ("ekf", "wls"):
+        # mean squares over the half sphere that a cell sees: cos^2 1/3, sin^2 2/3; a step of 2 / 2^6, 0.1 of Earthlight
+        squares = 0.03**2 + (2.0 / 64) ** 2 / 12.0 + 0.05**2 / 3.0 + math.radians(2.0) ** 2 * 2.0 / 3.0 + 0.1**2
+        assert values.cell_sigma == pytest.approx(math.sqrt(squares), rel=5e-3)
+    if estimator == "sun_filter":
+        assert (values.noise, values.gain_sigma, values.tilt_sigma_deg, values.output_low) == (0.03, 0.05, 2.0, 0.0)
+        assert (values.gyro.noise_deg_s, values.gyro.bias_deg_h, values.rate.start_deg_s) == (0.02, 5.0, 3.0)
+        assert (values.use_field, values.field.noise_nt, values.field.error_nt) == (True, 150.0, 300.0)
+    else:
+        # above what noise lights (5 sigma) and the Earth
+        assert values.gate == {"ekf": 0.4, "wls": 0.45, "wavg": 0.45}[estimator]
+    assert (values.eclipse.dark_level, values.eclipse.lit_level, values.minimum_output) == (0.15, 0.3, 0.3)
+
+
+@pytest.mark.parametrize(("altitude", "air"), [(300, (300e3, 1.9e-11, 50e3)), (560, (600e3, 1.5e-13, 71.8e3))])
+def test_all_that_disturbs_the_body_is_on(altitude, air):
+    values = made("3u", orbit=f"elements {altitude} 51.6 30").mission.node("dynamics").values
+    assert values.disturbances.gravity_gradient and values.disturbances.solar_pressure
+    assert values.disturbances.aerodynamic
+    assert (values.air.altitude, values.air.density, values.air.scale_height) == air
+
+
+def test_no_air_is_left_where_none_is_known():
+    assert not made("3u", orbit="elements 1200 51.6 30").mission.node("dynamics").values.disturbances.aerodynamic
+
+
 WRONG = [
     (["--mass", "-1"], "--mass: '-1' given, expected a number from"),
     (["--mass", "nan"], "--mass: 'nan' given"),

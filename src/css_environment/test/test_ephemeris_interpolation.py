@@ -13,6 +13,7 @@ from celestial import sun_directions
 from css_common.vectors import multiply
 from css_environment.constants import ASTRONOMICAL_UNIT
 from css_environment.earth_rotation import dcm_en_at
+from css_environment.eclipse import conical_illumination, cylindrical_illumination
 from css_environment.ephemeris import SEGMENT_S, at, build_ephemeris, segment_start
 from css_environment.magnetic_field import HIGHEST_DEGREE, field_along_orbit, omitted_field
 from css_environment.orbit import TleOrbit, keplerian_orbit, orbit_states
@@ -49,6 +50,30 @@ def test_position_velocity_and_sun(tabulated):
     assert np.abs(np.array([s.v_n for s in states]) - v).max() < 1e-3
     assert np.abs(np.array([s.sun_n for s in states]) - sun).max() < 1e-9
     np.testing.assert_allclose([s.solar_flux for s in states], (ASTRONOMICAL_UNIT / distance) ** 2, rtol=1e-10)
+
+
+@pytest.mark.parametrize("conical", [True, False])
+def test_light_is_that_of_the_shadow_that_was_asked_for(conical):
+    """Each instant of an orbit, and a sunset in steps of 0.1 s: a penumbra with the cone, none with the cylinder."""
+    orbit = ORBITS["okeefe"]
+    ephemeris = build_ephemeris(orbit, EPOCH_NS, field=False, conical_shadow=conical)
+    coarse = np.arange(0.0, 5600.0, 20.0)
+    lit = np.array([at(ephemeris, float(k)).illumination for k in coarse]) > 0.5
+    dusk = coarse[np.flatnonzero(lit[:-1] & ~lit[1:])[0]]
+    t = np.concatenate((coarse, np.arange(dusk - 10.0, dusk + 30.0, 0.1)))
+    r, _ = orbit_states(orbit, EPOCH_NS, t)
+    sun, distance = sun_directions(EPOCH_NS, t, r)
+    states = [at(ephemeris, float(k)) for k in t]
+    rows = zip(r.tolist(), sun.tolist(), distance.tolist(), strict=True)
+    expected = [
+        conical_illumination(tuple(a), tuple(b), d) if conical else cylindrical_illumination(tuple(a), tuple(b))
+        for a, b, d in rows
+    ]
+    light = np.array([s.illumination for s in states])
+    np.testing.assert_allclose(light, expected, atol=1e-5)
+    between = np.count_nonzero((light > 0.0) & (light < 1.0))
+    assert 60 < between < 120 if conical else between == 0
+    np.testing.assert_allclose([s.solar_flux for s in states], (ASTRONOMICAL_UNIT / distance) ** 2, rtol=1e-9)
 
 
 def test_tle_orbit_is_interpolated_as_well():

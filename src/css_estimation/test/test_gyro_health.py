@@ -16,6 +16,7 @@ from css_common.health import (
     KIND_SCALED,
     KIND_SIGN,
     KIND_SILENT,
+    KIND_SPIKES,
     KIND_STUCK,
 )
 from css_common.schema import default_values
@@ -171,6 +172,21 @@ def test_spikes_are_dropped_and_nothing_else():
     # the last good value stands in, of the axis that was hit alone
     np.testing.assert_array_equal(result.rate_b[hit, 2], gyro[np.flatnonzero(hit) - 1, 2])
     np.testing.assert_array_equal(result.rate_b[hit, :2], gyro[hit, :2])
+
+
+@pytest.mark.parametrize(
+    ("squared", "kind"), [(0.5, KIND_SPIKES), (1.0, KIND_SPIKES), (3.0, KIND_NOISY), (6.0, KIND_NOISY)]
+)
+@pytest.mark.parametrize("seed", range(3))
+def test_too_many_spikes_are_noise_where_the_samples_between_are_no_better(squared, kind, seed):
+    """Twice the mean squared change of the noise that is expected, 0.03 deg/s, is where one ends."""
+    omega, _, sun, _ = flight(RATES[0], seed)
+    dice = np.random.default_rng(seed)
+    gyro = omega + np.sqrt(squared) * 0.03 * DEG * dice.normal(size=omega.shape)
+    gyro[600:, 1] += 20.0 * DEG * dice.choice((-1.0, 0.0, 1.0), COUNT - 600, p=(0.2, 0.6, 0.2))
+    result = judged(gyro, sun)
+    assert result.mode[-1] == GYRO_LEFT
+    assert result.gyro_kinds == {1: kind}
 
 
 def test_no_number_is_replaced_for_a_second_then_the_gyro_is_left():

@@ -281,6 +281,21 @@ def test_symbols_of_an_object(objects):
         contents(b"something else")
 
 
+@pytest.mark.parametrize("target", TARGETS.values(), ids=TARGETS)
+def test_bytes_of_an_object_are_those_of_its_code_and_data(target):
+    data = (
+        "@kept = constant [5 x i32] [i32 1, i32 2, i32 3, i32 4, i32 5]\n@set = global i32 7\n@clear = global i64 0\n"
+    )
+    names = ["kept", "set", "clear"]
+    found = contents(machine_code("data", [data], names, target).object)
+    assert (found.code, found.constants, found.variables) == (0, 20, 12)
+    assert sorted(found.offered) == sorted(names) and found.missing == []
+    both = contents(machine_code("both", [data + CODE.format("a")], [*names, "a"], target).object)
+    (function,) = (symbol for symbol in both.symbols if symbol.is_function and symbol.defined)
+    assert function.name == "a" and both.code >= function.size > 0
+    assert both.variables == found.variables and "elsewhere" in both.missing
+
+
 @pytest.mark.skipif(shutil.which("nm") is None, reason="binutils are not installed")
 def test_an_archive_is_read_by_binutils(objects, tmp_path):
     file = tmp_path / "lib.a"

@@ -222,7 +222,14 @@ def test_the_page_has_every_figure_and_number(tmp_path, monkeypatch, capsys):
     for file in files:
         pixels = image.imread(file)
         assert min(pixels.shape[:2]) > 300 and pixels[..., :3].std() > 0.02
-    for words in ("albedo from nadir", "inertia x 2", "21 December, albedo x 0.5", "K 0.148", "with reflectors"):
+    for words in (
+        "albedo from nadir",
+        "inertia x 2",
+        "21 December, albedo x 0.5",
+        "K 0.148",
+        "with reflectors",
+        ", 3 cases each;",
+    ):
         assert words in page
     # no column is cut off where a console has no width
     assert "…" not in out

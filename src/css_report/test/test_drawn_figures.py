@@ -89,6 +89,7 @@ def test_a_large_map_keeps_its_largest_value(tmp_path):
         drawn.colorbar(image, ax=axes).set_label("error [deg]")
         axes.set_xlabel("azimuth [deg]")
         axes.set_ylabel("angle [deg]")
+        axes.set_title("Errors")
         save(drawn, tmp_path / "map.png")
     plots = plots_of(drawn, "map")
     assert plots is not None
@@ -108,6 +109,7 @@ def test_classes_of_a_map_keep_their_colours(tmp_path):
         axes.imshow(np.array([[1, 2], [2, 1]]), cmap=colours, norm=BoundaryNorm(np.arange(4) - 0.5, 3), aspect="auto")
         axes.set_xlabel("x")
         axes.set_ylabel("y")
+        axes.set_title("Classes")
         save(drawn, tmp_path / "classes.png")
     plots = plots_of(drawn, "classes")
     assert plots is not None
@@ -124,5 +126,6 @@ def test_what_has_no_counterpart_leaves_the_picture(tmp_path):
         axes.scatter([0.0, 1.0], [1.0, 2.0])
         axes.set_xlabel("x")
         axes.set_ylabel("y")
+        axes.set_title("Dots")
         save(drawn, tmp_path / "dots.png")
     assert plots_of(drawn, "dots") is None

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from css_common.attitude import mrp_to_dcm
 from css_common.codec import codec_of
 from css_common.component import Component, all_conflicts
+from css_sim.flight_environment import flight_environment
 from css_sim.nodes.css_array import CssArray
 from css_sim.nodes.dynamics import Dynamics
 from css_sim.nodes.gyro import Gyro
@@ -37,6 +38,17 @@ def truths(steps, **changes):
 
 def outputs(component, messages, key):
     return [component.cycle(m.stamp_ns, {"truth": m})[key] for m in messages]
+
+
+@pytest.mark.parametrize(("shadow", "field"), [("conical", True), ("cylindrical", False)])
+def test_a_mission_has_the_shadow_and_the_field_that_it_asks_for(shadow, field):
+    values = build(Dynamics, shadow=shadow, geomagnetic_field=field).values
+    environment = flight_environment(values)
+    states = [environment.at(float(t)) for t in np.arange(0.0, 5600.0, 1.0)]
+    light = np.array([state.illumination for state in states])
+    assert {0.0, 1.0} <= set(light) and np.any((light > 0.0) & (light < 1.0)) == (shadow == "conical")
+    assert all(any(state.field_n) is field for state in states[::500])
+    assert not any(flight_environment(values, field=False).at(0.0).field_n)
 
 
 def test_flight_has_as_many_stamps_as_cycles():

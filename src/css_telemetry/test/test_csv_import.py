@@ -111,6 +111,22 @@ def test_mission_inside_holds_the_layout_and_passes_the_checks_of_missions(tmp_p
     assert values["mission.period"] == 0.1
     assert values["mission.epoch"] == "2013-06-01T00:00:00Z"
     assert values["mission.name"] == "table"
+    assert values["mission.duration"] == 1.0
+    assert values["io.largest_gap"] == 60.0
+
+
+@pytest.mark.parametrize(
+    ("times", "period", "gap"),
+    [((0.0, 25.0, 50.0), 25.0, 60.0), ((0.0, 1.0, 2.0, 102.0), 1.0, 200.0), ((0.0, 100.0), 60.0, 200.0)],
+)
+def test_what_a_replay_bears_follows_from_the_steps(tmp_path, times, period, gap):
+    """Twice the largest step, at least a minute; no cycle is longer than a minute."""
+    rows = "".join(f"{1370000000.0 + time},1,2\n" for time in times)
+    imported(table(tmp_path, f"time,c1,c2\n{rows}"), tmp_path / "bag")
+    with BagReader(tmp_path / "bag") as reader:
+        values = flattened(read_sections(present(reader.mission_text), "recording")["/**"])
+    assert (values["mission.period"], values["io.largest_gap"]) == (period, gap)
+    assert values["mission.duration"] == times[-1]
 
 
 def test_columns_that_are_not_there_make_no_topics(tmp_path):
