@@ -10,8 +10,8 @@ from pathlib import Path
 _LOADER = "css_common.node_files"
 # They run what is installed with ROS against what is laid out without: with a mutant on both sides.
 _LEFT_OUT = ("test_without_ros.py",)
-# They look at the parameters and the options of all packages, in a second.
-_OF_ALL = ("test_parameter_limits.py", "test_option_ranges.py")
+# It looks at the options of all packages, in a second.
+_OF_ALL = ("test_option_ranges.py",)
 # This module imports the paper that it is asked for.
 _PAPERS = "css_papers.papers"
 # This module draws every figure of the documentation.

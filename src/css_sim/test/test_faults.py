@@ -287,20 +287,3 @@ WRONG = {
 def test_wrong_lines_are_refused_with_what_would_be_right(text):
     with pytest.raises(ValueError, match=re.escape(WRONG[text])):
         parse_line(text, KINDS, UNITS)
-
-
-LARGEST = {"cell": 10.0, "gyro": 1e4, "magnetometer": 1e6, "wheel": 100.0, "rod": 1e4, "tachometer": 1e6}
-"""In the units of the lines; what is no amount of what a unit reads stands in `RANGES`."""
-RANGES = {
-    "factor": (-1e3, 1e3), "share": (0.0, 1.0), "spell": (0.0, 1e6), "other": (0.0, 31.0), "coulomb": (0.0, 1.0),
-    "viscous": (0.0, 1.0), "delay_us": (1.0, 1e6), "wheel limit": (0.0, 1e6), "head rate": (0.0, 1e3),
-}  # fmt: skip
-
-
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: f"{kind.sort} {kind.name}")
-def test_values_have_the_range_of_what_they_are(kind):
-    for value in kind.values:
-        name, most = value.parameter.name, LARGEST.get(kind.sort, math.nan)
-        amount = (0.0 if name in ("sigma", "limit", "size") else -most, most)
-        expected = RANGES.get(f"{kind.sort} {name}", RANGES.get(name, amount))
-        assert (value.parameter.low, value.parameter.high) == expected, name
