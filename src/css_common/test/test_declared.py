@@ -79,5 +79,6 @@ def test_tables_are_written_below_the_headings_of_nodes_and_nowhere_else():
     after = rewritten(before, "css_estimation")
     assert documented(before) == ["wavg"]
     assert after.startswith(f"# A package\n\n### wavg\n\nA sentence.\n\n{head}| `cell_sigma` * | 0.1 |")
-    assert after.endswith(f"| light that ends an eclipse |\n\nAfter.\n\n{other}") and "gone" not in after
+    last = "the longest darkness that is an eclipse |\n\nAfter.\n\n"
+    assert after.endswith(f"{last}{other}") and "gone" not in after
     assert rewritten(after, "css_estimation") == after

@@ -103,6 +103,7 @@ def test_figures_that_are_kept_can_be_zoomed(tmp_path):
     with style(), keep_figures():
         figure = new_figure(4.0, 3.0)
         axes = figure.subplots()
+        axes.set_title("Errors")
         axes.plot([0.0, 1.0, 2.0], [3.0, 5.0, 4.0], label="mean")
         axes.set_xlabel("time [s]")
         axes.set_ylabel("angle [deg]")

@@ -140,8 +140,10 @@ def damping_torque(p: SpinParameters, omega_bn_b: Vec3) -> Vec3:
 
 @kernel
 def wanted_rate(p: SpinParameters, sun_b: Vec3, sun_known: bool) -> Vec3:
-    """Rate omega_d [rad/s] in b, with or without a Sun."""
-    alpha = p.alignment if sun_known else 0.0
+    """Rate omega_d [rad/s] in b, with or without a Sun; a direction that is not known may be no number."""
+    if not sun_known:
+        return scale(p.spin_rate, p.array_normal_b)
+    alpha = p.alignment
     return scale(p.spin_rate, add(scale(alpha, sun_b), scale(1.0 - alpha, p.array_normal_b)))
 
 
