@@ -340,7 +340,21 @@ def test_noise_that_ends_with_the_converter_is_taken_for_what_it_is(output):
     assert slope == pytest.approx(np.mean(output + draws > low - dark), abs=4e-3)
     assert variance == pytest.approx(read.var(), rel=0.02)
     nowhere = sun_filter.parameters(okeefe_values(SunFilter.table(), noise=noise))
-    assert read_above(nowhere, output, nowhere.errors.output_low) == (output, 1.0, nowhere.errors.noise)
+    assert read_above(nowhere, output, nowhere.cells[0]["low"]) == (output, 1.0, nowhere.errors.noise)
+
+
+def test_what_a_calibration_takes_off_it_takes_off_the_end_of_the_converter():
+    """A dark level of 0.4 of the noise is that of the converter's end, which the filter knows."""
+    noise, scales = 0.005, [1.0, 0.9, 1.1, 1.0, 1.0, 1.0, 1.0, 1.0]
+    darks = [0.002, 0.0025, 0.05, -0.002, 0.0, 0.0031, 0.002, 0.002]
+    measured = {"cells__measured__scales": scales, "cells__measured__darks": darks}
+    cells = sun_filter.parameters(okeefe_values(SunFilter.table(), noise=noise, output_low=0.0, **measured)).cells
+    raw = np.array([0.0, 0.3, 0.9])
+    for i, (scale, dark) in enumerate(zip(scales, darks, strict=True)):
+        heard = (raw - dark) / scale  # as the node corrects what it hears
+        level = 0.0 if abs(dark) < 0.6 * noise else dark
+        np.testing.assert_allclose(heard - cells[i]["dark"], (raw - level) / scale, atol=1e-15)
+        assert cells[i]["low"] - cells[i]["dark"] == pytest.approx((0.0 - level) / scale, abs=1e-15)
 
 
 def test_faces_that_graze_the_sun_do_not_mislead():

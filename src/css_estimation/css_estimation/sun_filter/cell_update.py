@@ -132,7 +132,7 @@ def read_cells(
             squared = 1.0 if c.expected < 0.0 else (v - c.expected) * (v - c.expected) / p.errors.noise
             likelihood -= 0.5 * (min(squared, p.convergence.gate) + math.log(p.errors.noise))
             continue
-        mean, share, noise = read_above(p, c.expected, p.errors.output_low - p.cells[i].dark)
+        mean, share, noise = read_above(p, c.expected, p.cells[i].low - p.cells[i].dark)
         innovation = v - mean - share * along(c, earth_known, correction)
         for j in range(states):
             gained[j] = share * along(c, earth_known, covariance[j])

@@ -32,15 +32,17 @@ from css_sensors.cells import (
     own_view_cosines,
     plane_sides,
 )
+from css_sensors.corrections import corrections, of_output
 
-CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark")], align=True)
-"""One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain and
-output in the dark [-]."""
+CELL = np.dtype([(name, np.float64) for name in ("nx", "ny", "nz", "side", "gain", "dark", "low")], align=True)
+"""One cell as calibrated: unit normal in b, side of the body plane that hides half of its sky (0: none), gain,
+output in the dark and lowest output [-]."""
 
 WHEEL = np.dtype([(name, np.float64) for name in ("hx", "hy", "hz")], align=True)
 """One reaction wheel: spin axis times spin inertia [kg m2]."""
 
 _NO_NORMAL = 1e-9
+_END_OF_NOISE = 0.6  # of its deviation; the mean of its upper half alone is 0.4
 _FEWEST = 2  # points of a table
 
 GAINS = reals("calibration.gains", (), "-", "output of each cell relative to the nominal; empty: all 1")
@@ -58,6 +60,17 @@ MINIMUM_OUTPUT = real("minimum_output", 0.3, "-", "no Sun unless a cell is above
 USE_WHEELS = flag("use_wheels", True, "without gyro, take the rate from angular momentum and wheel speeds")
 
 
+NOISE = real("noise", 0.006, "-", "white noise of a cell, 1 sigma", low=1e-6, high=1.0)
+OUTPUT_LOW = real(
+    "output_low",
+    -10.0,
+    "-",
+    "lowest output that the cells' converter gives, whose noise ends there; far below 0: nothing ends",
+    low=-10.0,
+    high=1.0,
+)
+
+
 def _cells(values: Values) -> np.ndarray:
     """(N,) of CELL."""
     nominal = known_normals(values)
@@ -68,6 +81,15 @@ def _cells(values: Values) -> np.ndarray:
     cells["side"] = plane_sides(values)
     cells["gain"] = values[GAINS] if len(values[GAINS]) else 1.0
     cells["dark"] = values[DARKS] if len(values[DARKS]) else 0.0
+    cells["low"] = lowest = values[OUTPUT_LOW]
+    taken_off = corrections(values)
+    if taken_off.of_cells:
+        # Outputs come with the mission's calibration taken off, and their lowest with them. A dark level that is no
+        # more than the noise of a dark cell above the end of the converter is put back: here that noise is known.
+        darks, scales = taken_off.darks, taken_off.scales
+        of_noise = abs(darks - lowest) < _END_OF_NOISE * values[NOISE]
+        cells["low"] = of_output(lowest, darks, scales)
+        cells["dark"] += np.where(of_noise, of_output(0.0, darks, scales), 0.0)
     return cells
 
 
@@ -139,17 +161,7 @@ class Response(NamedTuple):
 class CellErrors(NamedTuple):
     """Variances of what the model of the cells leaves out."""
 
-    noise: float = made(square, real("noise", 0.006, "-", "white noise of a cell, 1 sigma", low=1e-6, high=1.0))
-    output_low: float = given(
-        real(
-            "output_low",
-            -10.0,
-            "-",
-            "lowest output that the cells' converter gives, whose noise ends there; far below 0: nothing ends",
-            low=-10.0,
-            high=1.0,
-        )
-    )
+    noise: float = made(square, NOISE)
     common: float = made(
         square,
         real("common_noise", 0.005, "-", "white error of the output common to all cells, 1 sigma", low=0.0, high=1.0),
@@ -333,7 +345,7 @@ class Convergence(NamedTuple):
 class SunFilterParameters(NamedTuple):
     """All of the estimator."""
 
-    cells: np.ndarray = computed(_cells, GAINS, DARKS, NORMALS)
+    cells: np.ndarray = computed(_cells, GAINS, DARKS, NORMALS, OUTPUT_LOW)
     screen: Screen = computed(_screen)
     cos_half_view: float = computed(half_view_cosine)
     layout: CellLayout = computed(_layout, NORMALS)
