@@ -23,8 +23,7 @@ from css_estimation.health.cell_following import MOST_AT_ONCE
 from css_estimation.health.cell_memory import DIRECTIONS, NO_SIGNAL, PHASE_SETTLED, CellHealthMemory, Darkness, Track
 from css_estimation.health.cell_options import CellHealthParameters
 from css_estimation.health.cell_signals import signal_of
-from css_estimation.sun.cell_layout import cosine_on, sees
-from css_estimation.sun.direction_grid import direction
+from css_estimation.sun.cell_layout import sees_all
 from css_estimation.sun.sun_heading import Sky
 
 LATE = 60.0
@@ -163,7 +162,7 @@ def judge_lasting_darkness(
     else:
         told &= d.told
     if unlit > p.longest_eclipse and not lasting:
-        if _sees_all(p, told):
+        if sees_all(p.layout, told & ~p.screened, p.minimum, DIRECTIONS):
             for i in range(memory.cells.shape[0]):
                 # a NaN compares false
                 dark = told >> i & 1 == 1 and abs(memory.used[i]) < _darkest(p)
@@ -197,21 +196,6 @@ def _given(memory: CellHealthMemory) -> int:
         if not math.isnan(memory.used[i]):
             mask |= 1 << i
     return mask
-
-
-@kernel
-def _sees_all(p: CellHealthParameters, told: int) -> bool:
-    """Whether the Sun lights a cell of a mask wherever it stands."""
-    for g in range(DIRECTIONS):
-        sun_b = direction(g, DIRECTIONS)
-        seen = False
-        for i in range(p.layout.cells.shape[0]):
-            whole = told >> i & 1 == 1 and p.screened >> i & 1 == 0
-            if whole and sees(p.layout, i, sun_b) and cosine_on(p.layout, i, sun_b) > p.minimum:
-                seen = True
-        if not seen:
-            return False
-    return True
 
 
 @kernel

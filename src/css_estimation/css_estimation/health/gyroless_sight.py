@@ -21,7 +21,7 @@ from css_estimation.health.rate_checks import LARGEST_UNKNOWN, RateChecks, unkno
 from css_estimation.health.sight import Sight
 from css_estimation.sun import sunline_cycle
 from css_estimation.sun.cell_layout import READABLE, cosine_on
-from css_estimation.sun.left_open import span_of, surely_spans_space, tell_one_sun
+from css_estimation.sun.left_open import spans_space, tell_one_sun
 from css_estimation.sun.sun_heading import VALIDITY_VALID, Aiding, Sky, SunHeading
 from css_estimation.sun.sun_tracking import TrackingState
 from css_estimation.sun.sunline_cycle import SunlineParameters, SunlineState, step_alone
@@ -143,7 +143,7 @@ def _shows_the_sun(p: SunlineParameters, voltages) -> bool:
         # a NaN compares false
         if _NO_EARTH < voltages[i] < READABLE:
             bright |= 1 << i
-    return surely_spans_space(p.layout.cells, bright) or span_of(p.layout.cells, bright).rank == 3
+    return spans_space(p.layout.cells, bright)
 
 
 @kernel

@@ -123,9 +123,8 @@ def _acceleration(values: Values) -> float:
     said = math.radians(values[ACCELERATION])
     if INERTIA not in values or WHEELS_FITTED not in values or not len(values[INERTIA]):
         return said
-    torques = np.einsum(
-        "n,ni->i", of_each_wheel(values, WHEEL_MAX_TORQUE)[: len(wheel_axes(values))], abs(wheel_axes(values))
-    )
+    axes = wheel_axes(values)
+    torques = np.einsum("n,ni->i", of_each_wheel(values, WHEEL_MAX_TORQUE)[: len(axes)], abs(axes))
     by_wheels = np.einsum("ij,j->i", abs(np.array(inverse(mat3(values[INERTIA])))), np.nan_to_num(torques))
     return max(said, float(np.max(by_wheels)))
 

@@ -10,6 +10,7 @@ from css_common.kernel import kernel
 from css_common.schema import Values
 from css_common.vectors import Vec3, vector_of
 from css_environment.albedo import Screen, is_blocked, plane_screen, view_cosine, with_views
+from css_estimation.sun.direction_grid import direction
 from css_estimation.symmetric import Symmetric, product
 from css_sensors.cells import (
     IN_PLANE,
@@ -70,6 +71,19 @@ def sees(layout: CellLayout, i: int, direction_b: Vec3) -> bool:
         return True
     c = layout.clip_normal_b
     return cell.side * (c[0] * d[0] + c[1] * d[1] + c[2] * d[2]) > 0.0
+
+
+@kernel
+def sees_all(layout: CellLayout, mask: int, level: float, directions: int) -> bool:
+    """Whether the Sun lights a cell in `mask` above `level` wherever it stands, looked at in so many directions."""
+    for g in range(directions):
+        sun_b = direction(g, directions)
+        lit = False
+        for i in range(layout.cells.shape[0]):
+            lit = lit or (mask >> i & 1 == 1 and sees(layout, i, sun_b) and cosine_on(layout, i, sun_b) > level)
+        if not lit:
+            return False
+    return True
 
 
 @kernel

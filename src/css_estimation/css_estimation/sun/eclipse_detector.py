@@ -17,8 +17,7 @@ from typing import NamedTuple
 from css_common.declared import builder, computed, given, made, table_of
 from css_common.kernel import kernel
 from css_common.schema import Values, choice, real
-from css_estimation.sun.cell_layout import cell_layout, cosine_on, sees
-from css_estimation.sun.direction_grid import direction
+from css_estimation.sun.cell_layout import cell_layout, sees_all
 from css_estimation.sun.sun_heading import (
     ECLIPSE_ECLIPSED,
     ECLIPSE_SUNLIT,
@@ -42,18 +41,14 @@ SOURCE = choice(
 
 _DARK_LEVEL = real("eclipse.dark_level", 0.12, "-", "brightest output below which it is dark", low=0.0, high=1.0)
 _DIRECTIONS = 2000  # 4.5 deg from one to the next
+_ALL_CELLS = 2**32 - 1  # mask
 
 
 def _sees_all(values: Values) -> bool:
     """Whether the Sun lights a cell of the mission above `dark_level` wherever it stands."""
     if NORMALS not in values or not len(values[NORMALS]):
         return True
-    layout, level = cell_layout(values), values[_DARK_LEVEL]
-    suns_b = (direction(g, _DIRECTIONS) for g in range(_DIRECTIONS))
-    return all(
-        any(sees(layout, i, sun_b) and cosine_on(layout, i, sun_b) > level for i in range(len(layout.cells)))
-        for sun_b in suns_b
-    )
+    return bool(sees_all(cell_layout(values), _ALL_CELLS, values[_DARK_LEVEL], _DIRECTIONS))
 
 
 class EclipseParameters(NamedTuple):

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from css_common.kernel import kernel
 from css_common.vectors import Mat3, Vec3, add, axes_across, cross, dot, multiply, norm, scale, subtract, unit
-from css_estimation.sun.cell_layout import READABLE, CellLayout, cosine_on, half_view_of
+from css_estimation.sun.cell_layout import READABLE, CellLayout, cosine_on, half_view_of, missing_cells
 from css_estimation.symmetric import Symmetric, add_outer, eigen, trace
 from css_sensors.cells import IN_PLANE
 
@@ -111,6 +111,12 @@ def surely_spans_space(cells, mask: int) -> bool:
 
 
 @kernel
+def spans_space(cells, mask: int) -> bool:
+    """Whether the normals of the cells in `mask` span space."""
+    return surely_spans_space(cells, mask) or span_of(cells, mask).rank == 3
+
+
+@kernel
 def tell_one_sun(cells, voltages) -> bool:
     """Whether the normals of all cells that have a reading, dark ones too, span space: else each Sun has a twin.
 
@@ -118,12 +124,7 @@ def tell_one_sun(cells, voltages) -> bool:
         cells: (N,) with the fields nx, ny, nz.
         voltages: (N,) outputs, NaN where there is none.
     """
-    read = 0
-    for i in range(voltages.shape[0]):
-        # a NaN compares false
-        if abs(voltages[i]) < READABLE:
-            read |= 1 << i
-    return surely_spans_space(cells, read) or span_of(cells, read).rank == 3
+    return spans_space(cells, ~missing_cells(voltages))
 
 
 @kernel
